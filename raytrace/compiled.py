@@ -1,0 +1,226 @@
+"""A scene as the kernels read it: float32 arrays relative to the scene's origin.
+
+Triangles are stored one record each, corners included, rather than as indices into shared vertices: a ray that lands
+anywhere then touches two cache lines instead of seven.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from errors import UserError
+from raytrace.camera import Camera
+from raytrace.sampling import build_alias
+from raytrace.scene import Mesh, Scene
+from raytrace.textures import TextureAtlas, build_atlas, sample_bilinear
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+I32 = NDArray[np.int32]
+
+MATERIAL, OBJECT, LIGHT = 0, 1, 2
+"""Columns of :attr:`CompiledScene.triangle_info`."""
+
+
+@dataclass(frozen=True)
+class Lights:
+    """Emissive triangles and the constant sky, chosen in proportion to their power.
+
+    ``triangles`` (L,) int32 and ``areas`` (L,) float32; ``threshold``, ``alias``, ``pdf`` the alias table over the L
+    triangles, plus one last entry for the sky where there is one. ``sky`` (3,) float32.
+    """
+
+    triangles: I32
+    areas: F32
+    threshold: F32
+    alias: I32
+    pdf: F32
+    sky: F32
+    has_sky: bool
+
+
+@dataclass
+class CompiledScene:
+    """``triangles`` (T, 18) float32: three corners, then their three unit shading normals; moving ones last.
+
+    ``triangle_info`` (T, 3) int32: material, object, light index or -1. ``triangle_uvs`` (T, 6) float32 and
+    ``uv_density`` (T,) float32, uv units per scene unit (both of length 1 where nothing is textured).
+    ``base_color``, ``emission`` (M, 3) float32; ``material_info`` (M, 3) int32: base texture, emission texture, double
+    sided. ``prev_triangles`` (moving, 18) float32: the moving ones one frame ago.
+    ``static_count``: number of triangles that never move.
+    """
+
+    scene: Scene
+    origin: F64
+    triangles: F32
+    triangle_info: I32
+    triangle_uvs: F32
+    uv_density: F32
+    base_color: F32
+    emission: F32
+    material_info: I32
+    textures: TextureAtlas
+    lights: Lights
+    static_count: int
+    prev_triangles: F32
+    extent: float
+
+    @property
+    def has_textures(self) -> bool:
+        return bool(self.material_info[:, :2].max() >= 0)
+
+    @property
+    def has_motion(self) -> bool:
+        return self.static_count < len(self.triangles)
+
+    def move_to(self, time: float, previous_time: float) -> None:
+        """Write the moving triangles' positions and normals at both times (seconds)."""
+        if not self.has_motion:
+            return
+        self.triangles[self.static_count :] = self._moving_at(time)
+        self.prev_triangles[:] = self._moving_at(previous_time)
+
+    def _moving_at(self, time: float) -> F32:
+        parts = [_corners(mesh, self.origin, time) for mesh in self.scene.meshes if mesh.motion is not None]
+        return np.concatenate(parts)
+
+    def moving_box(self) -> tuple[F32, F32]:
+        """Bounds of the moving triangles as they are now, each (3,) float32, widened against rounding."""
+        corners = self.triangles[self.static_count :, :9].reshape(-1, 3)
+        margin = np.float32(1e-5 * self.extent)
+        return corners.min(0) - margin, corners.max(0) + margin
+
+    def camera_at(self, time: float, moving: bool) -> Camera:
+        """The flight's camera at ``time`` seconds, or the still one."""
+        return self.scene.flight(time) if moving and self.scene.flight is not None else self.scene.camera
+
+
+def _corners(mesh: Mesh, origin: F64, time: float = 0.0) -> F32:
+    """(F, 18) float32 records of one mesh: corners relative to ``origin``, then unit shading normals."""
+    matrix = np.eye(4) if mesh.motion is None else np.asarray(mesh.motion(time), dtype=np.float64)
+    vertices = mesh.vertices if mesh.motion is None else mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3]
+    corners = (vertices - origin)[mesh.faces]
+    if mesh.normals is None:
+        face = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        length = np.linalg.norm(face, axis=1, keepdims=True)
+        face = face / np.where(length > 0.0, length, 1.0)
+        normals = np.repeat(face[:, None], 3, axis=1)
+    else:
+        normals = mesh.normals[mesh.faces].astype(np.float64) @ matrix[:3, :3].T
+    return np.concatenate([corners.reshape(-1, 9), normals.reshape(-1, 9)], axis=1).astype(np.float32)
+
+
+def _uv_density(uvs: F64, triangles: F32) -> F32:
+    """sqrt(area in texture space / area in the world): texture units per scene unit, (T,) float32."""
+    a, b, c = uvs[:, 0:2], uvs[:, 2:4], uvs[:, 4:6]
+    uv_area = np.abs((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
+    p = triangles[:, :9].reshape(-1, 3, 3).astype(np.float64)
+    area = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
+    return np.sqrt(uv_area / np.maximum(area, 1e-30)).astype(np.float32)
+
+
+def compile_scene(scene: Scene) -> CompiledScene:
+    """Prepare ``scene`` for tracing. Raises UserError for a scene without triangles."""
+    if scene.triangle_count == 0:
+        raise UserError(f"{scene.name}: there is no triangle in this scene", "check that the file holds meshes")
+    meshes = [m for m in scene.meshes if m.motion is None] + [m for m in scene.meshes if m.motion is not None]
+    static_count = sum(len(m.faces) for m in meshes if m.motion is None)
+    origin = scene.origin
+    triangles = np.concatenate([_corners(mesh, origin) for mesh in meshes])
+    info = np.full((len(triangles), 3), -1, dtype=np.int32)
+    info[:, MATERIAL] = np.concatenate([m.materials for m in meshes])
+    info[:, OBJECT] = np.repeat(np.arange(len(meshes)), [len(m.faces) for m in meshes])
+
+    materials = scene.materials
+    material_info = np.array(
+        [(m.base_texture, m.emission_texture if m.emits else -1, m.double_sided) for m in materials], dtype=np.int32
+    )
+    uvs, density = np.zeros((1, 6), np.float32), np.zeros(1, np.float32)
+    if material_info[:, :2].max() >= 0:
+        zero = np.zeros((1, 2), np.float32)
+        uvs = np.concatenate(
+            [m.uvs[m.faces].reshape(-1, 6) if m.uvs is not None else np.tile(zero, (len(m.faces), 3)) for m in meshes]
+        ).astype(np.float32)
+        density = _uv_density(uvs.astype(np.float64), triangles)
+    lower, upper = scene.bounds()
+    compiled = CompiledScene(
+        scene=scene,
+        origin=origin,
+        triangles=np.ascontiguousarray(triangles),
+        triangle_info=info,
+        triangle_uvs=np.ascontiguousarray(uvs),
+        uv_density=density,
+        base_color=np.array([m.base_color for m in materials], dtype=np.float32),
+        emission=np.array([m.emission for m in materials], dtype=np.float32),
+        material_info=material_info,
+        textures=build_atlas(scene.textures),
+        lights=_no_lights(),
+        static_count=static_count,
+        prev_triangles=triangles[static_count:].copy(),
+        extent=float(np.linalg.norm(upper - lower)),
+    )
+    compiled.lights = _collect_lights(compiled)
+    return compiled
+
+
+def _no_lights() -> Lights:
+    none = np.zeros(0, np.float32)
+    return Lights(np.zeros(0, np.int32), none, none, np.zeros(0, np.int32), none, np.zeros(3, np.float32), False)
+
+
+_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+_SKY_SHARE = 0.5  # of all light samples: by power alone the sky outside would starve the lamps of a closed room
+
+
+def _collect_lights(compiled: CompiledScene) -> Lights:
+    """Emissive triangles with their selection probabilities; fills the light column of ``triangle_info``."""
+    materials = compiled.triangle_info[:, MATERIAL]
+    emits = np.array([m.emits for m in compiled.scene.materials])
+    triangles = np.flatnonzero(emits[materials]).astype(np.int32)
+    corners = compiled.triangles[triangles, :9].reshape(-1, 3, 3).astype(np.float64)
+    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
+    mean = _mean_emission(compiled, triangles)
+    sides = 1.0 + compiled.material_info[materials[triangles], 2]
+    power = np.pi * areas * sides * (mean @ _LUMINANCE)
+    keep = power > 0.0  # a triangle under a black part of an emissive texture is no light
+    triangles, areas, power = triangles[keep], areas[keep], power[keep]
+    compiled.triangle_info[:, LIGHT] = -1
+    compiled.triangle_info[triangles, LIGHT] = np.arange(len(triangles))
+    sky = np.array(compiled.scene.sky or (0.0, 0.0, 0.0))
+    has_sky = compiled.scene.sky is not None and float(sky.max()) > 0.0
+    if has_sky:
+        # The power that a sphere around the scene receives, pi R^2 times the radiance times pi.
+        sky_power = np.pi**2 * (compiled.extent / 2) ** 2 * float(sky @ _LUMINANCE)
+        total = power.sum()
+        power = np.append(power, min(sky_power, total * _SKY_SHARE / (1 - _SKY_SHARE)) if total > 0 else 1.0)
+    threshold, alias, pdf = build_alias(power) if len(power) else (np.zeros(0, np.float32),) * 3
+    return Lights(
+        triangles,
+        areas.astype(np.float32),
+        threshold,
+        np.asarray(alias, np.int32),
+        pdf,
+        sky.astype(np.float32),
+        has_sky,
+    )
+
+
+_STRATA = np.array([(i + 0.5, j + 0.5) for i in range(8) for j in range(8) if i + j < 7], dtype=np.float64) / 8
+
+
+def _mean_emission(compiled: CompiledScene, triangles: I32) -> F64:
+    """Mean radiance over each of ``triangles``, (n, 3) float64; textured ones are probed at fixed points."""
+    materials = compiled.triangle_info[triangles, MATERIAL]
+    radiance = compiled.emission[materials].astype(np.float64)
+    textures = compiled.material_info[materials, 1] if len(materials) else np.zeros(0, np.int32)
+    for index in np.unique(textures[textures >= 0]):
+        chosen = np.flatnonzero(textures == index)
+        uvs = compiled.triangle_uvs[triangles[chosen]].reshape(-1, 3, 2).astype(np.float64)
+        total = np.zeros((len(chosen), 3))
+        for b, c in _STRATA:
+            total += sample_bilinear(compiled.textures, int(index), (1 - b - c) * uvs[:, 0] + b * uvs[:, 1] + c * uvs[:, 2])
+        radiance[chosen] *= total / len(_STRATA)
+    return radiance

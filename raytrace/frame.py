@@ -1,0 +1,67 @@
+"""The frame packet: all that passes from the tracer to the filters, NumPy arrays only."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+F32 = NDArray[np.float32]
+
+MISS = -1.0
+"""Object id of a pixel whose camera ray leaves the scene."""
+
+
+@dataclass(frozen=True)
+class FramePacket:
+    """One frame at one path per pixel. Row 0 of every image is the bottom row; images are (H, W, C) float32.
+
+    With noise:
+
+    ``direct``, ``indirect`` (H, W, 4): rgb = illumination divided by the albedo ("demodulated"), linear; a unused (1).
+    Direct holds the light sample of the first hit and light sources hit by the bounce ray, combined by multiple
+    importance sampling; indirect is what arrives over one bounce. 0 where the camera ray misses.
+
+    Without noise (guides):
+
+    ``albedo`` (H, W, 4): rgb in [0, 1], the divisor above; a = 1 on surfaces, 0 on misses.
+    ``emission`` (H, W, 4): rgb = radiance emitted by the surface seen, or of the sky on a miss; a unused (1).
+    ``surface`` (H, W, 4): xyz = shading normal, world space, unit, towards the camera; w = depth along the camera's
+    forward axis, > 0, scene units. All 0 on a miss.
+    ``gradient`` (H, W, 2): d depth / d pixel in x and y of the tangent plane, scene units; 0 on a miss.
+    ``motion`` (H, W, 4): xy = previous uv minus uv; z = depth the surface point had in the previous frame (<= 0: it was
+    behind the camera; on a miss 0); w = object id, MISS on a miss. Unjittered; exactly 0 where nothing moves.
+    ``prev_normal`` (H, W, 4): xyz = shading normal that the surface point had in the previous frame, world space; w = 0.
+    None in a scene without moving objects: there it equals the normal.
+    ``position``, ``prev_position`` (H, W, 4): xyz = surface point now and one frame ago, relative to the scene's origin;
+    a = 1 on surfaces. None unless asked for.
+
+    ``timings``: seconds of wall time by stage name, of the tracer's own clock.
+    """
+
+    index: int
+    time: float
+    direct: F32
+    indirect: F32
+    albedo: F32
+    emission: F32
+    surface: F32
+    gradient: F32
+    motion: F32
+    prev_normal: F32 | None = None
+    position: F32 | None = None
+    prev_position: F32 | None = None
+    scene: str = ""
+    cut: bool = False
+    jitter: tuple[float, float] = (0.0, 0.0)
+    timings: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height in pixels."""
+        return self.direct.shape[1], self.direct.shape[0]
+
+    def radiance(self) -> F32:
+        """The noisy picture: (direct + indirect) x albedo + emission, (H, W, 3) linear radiance."""
+        return (self.direct[..., :3] + self.indirect[..., :3]) * self.albedo[..., :3] + self.emission[..., :3]

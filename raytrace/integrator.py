@@ -1,0 +1,357 @@
+"""The tracer: frames at one path per pixel, and converged references of the same frames.
+
+Two cores, as adaptive temporal filtering needs them (Schied et al. 2018): :meth:`Tracer.primary` finds the surface
+points that the camera sees, :meth:`Tracer.shade` estimates the light at any surface points with given random numbers.
+An image is cut into tiles; each is carried from camera ray to result by one worker thread, through compiled kernels and
+Embree calls that both run without Python's global lock.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raytrace import kernels
+from raytrace.camera import Camera
+from raytrace.compiled import OBJECT, CompiledScene
+from raytrace.embree import RayCaster
+from raytrace.frame import FramePacket
+from raytrace.kernels import SHADOW_END, Outputs, Variant
+from raytrace.sampling import HALTON, HASH
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+I32 = NDArray[np.int32]
+U32 = NDArray[np.uint32]
+
+REFERENCE_SEED = 0x5EED0000
+"""Added to the run's seed for references, whose frame numbers moreover start at 2^31: no path is shared with a frame."""
+
+
+@dataclass(frozen=True)
+class Hits:
+    """Surface points: ``triangle`` (n,) int32, -1 = none; barycentrics ``u``, ``v`` (n,) float32 of its second and
+    third corner; ``object`` (n,) int32, -1 = none."""
+
+    triangle: I32
+    u: F32
+    v: F32
+    object: I32
+
+
+@dataclass(frozen=True)
+class Seeds:
+    """Whose random numbers a path uses: ``pixel`` and ``frame`` (n,) uint32. Copying a pair repeats the path."""
+
+    pixel: U32
+    frame: U32
+
+
+@dataclass(frozen=True)
+class View:
+    """A camera prepared for one image size: float32 arrays relative to the scene's origin."""
+
+    size: tuple[int, int]
+    eye: F32
+    right: F32
+    up: F32
+    forward: F32
+    matrix: F32
+    jitter: F32
+
+    @staticmethod
+    def of(camera: Camera, size: tuple[int, int], origin: F64) -> View:
+        aspect = size[0] / size[1]
+        right, up, forward = camera.basis()
+        tangent = np.tan(camera.yfov / 2)
+        return View(
+            size,
+            (np.asarray(camera.position) - origin).astype(np.float32),
+            (right * tangent * aspect).astype(np.float32),
+            (up * tangent).astype(np.float32),
+            forward.astype(np.float32),
+            camera.view_projection(aspect, origin),
+            np.array(camera.jitter, dtype=np.float32),
+        )
+
+
+class _Scratch(threading.local):
+    """Buffers of one thread for tiles of up to ``capacity`` paths, made on first use."""
+
+    def __init__(self) -> None:
+        self.capacity = 0
+
+    def reserve(self, count: int) -> None:
+        if count <= self.capacity:
+            return
+        self.capacity = count
+        rays = np.empty((6, count, 3), np.float32)
+        self.origins, self.directions, self.shadow_o, self.shadow_d, self.bounce_o, self.bounce_d = rays
+        self.light = np.empty((count, 3), np.float32)
+        self.index, self.bounce_index = np.empty((2, count), np.int32)
+        self.bounce_pdf, self.limit = np.empty((2, count), np.float32)
+
+
+@dataclass
+class Settings:
+    """How frames are traced. ``generator``: HALTON or HASH; ``threads`` 0 = one per core; ``tile`` pixels per tile."""
+
+    seed: int = 0
+    generator: int = HALTON
+    threads: int = 0
+    tile: int = 16384
+    positions: bool = False
+    extra: dict[str, float] = field(default_factory=dict)
+
+
+class Tracer:
+    """Traces one compiled scene. ``with Tracer(...)`` or :meth:`close` ends its threads."""
+
+    def __init__(self, scene: CompiledScene, settings: Settings | None = None) -> None:
+        self.scene = scene
+        self.settings = settings or Settings()
+        self.variant: Variant = kernels.variant_of(scene)
+        self.rays = RayCaster(scene.triangles, scene.static_count)
+        self.tables = kernels.tables_of(scene)
+        self._guides = kernels.guide_kernel(self.variant, self.settings.positions)
+        self._first_hit = kernels.first_hit_kernel(self.variant)
+        self._second_hit = kernels.second_hit_kernel(self.variant)
+        self._scratch = _Scratch()
+        self.threads = self.settings.threads or len(os.sched_getaffinity(0))
+        self._pool = ThreadPoolExecutor(self.threads, "trace") if self.threads > 1 else None
+        self._time: tuple[float, float] | None = (0.0, 0.0) if not scene.has_motion else None
+
+    def __enter__(self) -> Tracer:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        if self._pool is not None:
+            self._pool.shutdown()
+
+    def set_time(self, now: float, previous: float) -> None:
+        """Move what moves to time ``now``; the previous positions are those at ``previous`` (seconds)."""
+        if self.scene.has_motion and self._time != (now, previous):
+            self.scene.move_to(now, previous)
+            self.rays.move(self.scene.triangles, self.scene.moving_box())
+            self._time = (now, previous)
+
+    def primary(self, view: View, pixels: I32) -> Hits:
+        """Surface points seen through ``pixels`` (n,) int32 = y·width + x, row 0 at the bottom."""
+        hits, _ = self._camera_hits(view, pixels)
+        return hits
+
+    def _camera_hits(self, view: View, pixels: I32) -> tuple[Hits, F32]:
+        count = len(pixels)
+        scratch = self._scratch
+        scratch.reserve(count)
+        origins, directions = scratch.origins[:count], scratch.directions[:count]
+        kernels.camera_rays(
+            pixels, *view.size, view.eye, view.right, view.up, view.forward, view.jitter, origins, directions
+        )
+        triangle, u, v = self.rays.intersect(origins, directions)
+        # Index -1 of a miss picks some object; it is overwritten where that matters.
+        objects = np.where(triangle >= 0, self.scene.triangle_info[triangle, OBJECT], np.int32(-1))
+        return Hits(triangle, u, v, objects), directions
+
+    def shade(self, hits: Hits, seeds: Seeds, eye: F32, direct: F32, indirect: F32) -> None:
+        """One path from each of ``hits``, with the random numbers of ``seeds``, at the time last set.
+
+        Writes ``direct`` and ``indirect`` (n, >= 3) float32: radiance towards ``eye`` (3,) float32 divided by the
+        albedo; 0 where there is no hit. Depends on nothing but the surface point, the seeds, the time and the side of
+        the surface that ``eye`` is on.
+        """
+        count = len(hits.triangle)
+        s = self._scratch
+        s.reserve(count)
+        settings = self.settings
+        direct[:, :3] = 0.0
+        indirect[:, :3] = 0.0
+        shadows, bounces = self._first_hit(
+            self.tables, hits.triangle, hits.u, hits.v, eye, seeds.pixel, seeds.frame, settings.seed,
+            settings.generator, s.shadow_o, s.shadow_d, s.index, s.light, s.bounce_o, s.bounce_d, s.bounce_index,
+            s.bounce_pdf,
+        )  # fmt: skip
+        self._trace_shadows(shadows, direct)
+        if bounces == 0:
+            return
+        bounce_o, bounce_d = s.bounce_o[:bounces], s.bounce_d[:bounces]
+        triangle, u, v = self.rays.intersect(bounce_o, bounce_d)
+        shadows = self._second_hit(
+            self.tables, triangle, u, v, bounce_o, bounce_d, s.bounce_index, s.bounce_pdf, seeds.pixel, seeds.frame,
+            settings.seed, settings.generator, direct, s.shadow_o, s.shadow_d, s.index, s.light,
+        )  # fmt: skip
+        self._trace_shadows(shadows, indirect)
+
+    def _trace_shadows(self, count: int, out: F32) -> None:
+        if count == 0:
+            return
+        s = self._scratch
+        kernels.fill(s.limit, count, SHADOW_END)
+        blocked = self.rays.occluded(s.shadow_o[:count], s.shadow_d[:count], s.limit[:count])
+        kernels.add_unoccluded(blocked, s.index, s.light, out)
+
+    def frame(
+        self,
+        index: int,
+        camera: Camera,
+        previous_camera: Camera,
+        size: tuple[int, int],
+        now: float = 0.0,
+        previous: float = 0.0,
+        cut: bool = False,
+    ) -> FramePacket:
+        """Frame ``index`` of the run at one path per pixel, ``size`` = (width, height).
+
+        ``now``, ``previous``: times in seconds of this frame and the one before it. ``cut``: the frame does not continue
+        the one before it.
+        """
+        start = time.perf_counter()
+        self.set_time(now, previous)
+        view, before = self._views(camera, previous_camera, size)
+        count = size[0] * size[1]
+        direct, indirect = np.empty((2, count, 4), np.float32)
+        direct[:, 3] = indirect[:, 3] = 1.0
+        outputs = self._outputs(count)
+
+        def tile(pixels: I32) -> None:
+            hits, directions = self._camera_hits(view, pixels)
+            self._write_guides(view, before, pixels, hits, directions, outputs)
+            seeds = Seeds(pixels.astype(np.uint32), np.full(len(pixels), index, np.uint32))
+            part = slice(int(pixels[0]), int(pixels[-1]) + 1)
+            self.shade(hits, seeds, view.eye, direct[part], indirect[part])
+
+        embree = self.for_each_tile(tile, count)
+        timings = {"trace": time.perf_counter() - start, "embree": embree}
+        return self._packet(index, now, size, direct, indirect, outputs, cut, camera.jitter, timings)
+
+    def reference(
+        self,
+        camera: Camera,
+        size: tuple[int, int],
+        samples: int,
+        now: float = 0.0,
+        first_sample: int = 0,
+        progress: Callable[[float], None] | None = None,
+    ) -> tuple[F64, F64]:
+        """Plain means of ``samples`` independent paths per pixel: direct and indirect, (H, W, 3) float64, demodulated.
+
+        Uncycled hash numbers that no frame of this or another run uses; no clamp, no regularisation. Means over
+        disjoint ranges of ``first_sample`` may be averaged.
+        """
+        self.set_time(now, now)
+        view, _ = self._views(camera, camera, size)
+        count = size[0] * size[1]
+        sums = np.zeros((2, count, 3))
+        normal = self.settings
+        self.settings = Settings(seed=(normal.seed + REFERENCE_SEED) & 0xFFFFFFFF, generator=HASH, tile=normal.tile)
+        done = [0]
+
+        def tile(pixels: I32) -> None:
+            hits, _ = self._camera_hits(view, pixels)
+            part = slice(int(pixels[0]), int(pixels[-1]) + 1)
+            direct, indirect = np.empty((2, len(pixels), 3), np.float32)
+            seeds = Seeds(pixels.astype(np.uint32), np.empty(len(pixels), np.uint32))
+            for sample in range(first_sample, first_sample + samples):
+                seeds.frame[:] = 0x80000000 + sample
+                self.shade(hits, seeds, view.eye, direct, indirect)
+                sums[0, part] += direct
+                sums[1, part] += indirect
+            done[0] += len(pixels)
+            if progress is not None:
+                progress(done[0] / count)
+
+        try:
+            self.for_each_tile(tile, count)
+        finally:
+            self.settings = normal
+        means = (sums / samples).reshape(2, size[1], size[0], 3)
+        return means[0], means[1]
+
+    def for_each_tile(self, work: Callable[[I32], None], count: int) -> float:
+        """Run ``work`` on tiles of consecutive pixels; returns seconds inside Embree, averaged over the threads."""
+        step = self.settings.tile
+        tiles = [np.arange(i, min(i + step, count), dtype=np.int32) for i in range(0, count, step)]
+
+        def timed(pixels: I32) -> float:
+            self.rays.clock.seconds = 0.0
+            work(pixels)
+            return self.rays.clock.seconds
+
+        if self._pool is None:
+            return sum(timed(t) for t in tiles)
+        return sum(self._pool.map(timed, tiles)) / self.threads
+
+    def _views(self, camera: Camera, previous: Camera, size: tuple[int, int]) -> tuple[View, View]:
+        origin = self.scene.origin
+        return View.of(camera, size, origin), View.of(previous, size, origin)
+
+    def _outputs(self, count: int) -> Outputs:
+        none = np.zeros((1, 4), np.float32)
+        four = np.empty((4, count, 4), np.float32)
+        four[1, :, 3] = 1.0
+        moving, positions = self.variant.moving, self.settings.positions
+        return Outputs(
+            albedo=four[0],
+            emission=four[1],
+            surface=four[2],
+            gradient=np.empty((count, 2), np.float32),
+            motion=four[3],
+            prev_normal=np.empty((count, 4), np.float32) if moving else none,
+            position=np.empty((count, 4), np.float32) if positions else none,
+            prev_position=np.empty((count, 4), np.float32) if positions else none,
+        )
+
+    def _write_guides(
+        self, view: View, before: View, pixels: I32, hits: Hits, directions: F32, outputs: Outputs
+    ) -> None:
+        self._guides(
+            self.tables, pixels, directions, hits.triangle, hits.u, hits.v, view.eye, view.right, view.up, view.forward,
+            view.matrix, before.matrix, view.size, outputs,
+        )  # fmt: skip
+
+    def _packet(
+        self,
+        index: int,
+        now: float,
+        size: tuple[int, int],
+        direct: F32,
+        indirect: F32,
+        out: Outputs,
+        cut: bool,
+        jitter: tuple[float, float],
+        timings: dict[str, float],
+    ) -> FramePacket:
+        width, height = size
+
+        def image(values: F32) -> F32:
+            return values.reshape(height, width, -1)
+
+        positions = self.settings.positions
+        return FramePacket(
+            index=index,
+            time=now,
+            direct=image(direct),
+            indirect=image(indirect),
+            albedo=image(out.albedo),
+            emission=image(out.emission),
+            surface=image(out.surface),
+            gradient=image(out.gradient),
+            motion=image(out.motion),
+            prev_normal=image(out.prev_normal) if self.variant.moving else None,
+            position=image(out.position) if positions else None,
+            prev_position=image(out.prev_position) if positions else None,
+            scene=self.scene.scene.name,
+            cut=cut,
+            jitter=jitter,
+            timings=timings,
+        )

@@ -1,0 +1,162 @@
+"""Random numbers and sample warps, compiled.
+
+Two generators, both pure functions of (seed, pixel, frame, dimension), so that a picture depends neither on the number
+of threads nor on the tiling, and a remembered surface point can be shaded again with the numbers it had:
+
+``HALTON``  16 points of the Halton sequence in bases 2 and 3, cycled over the frames, as in Schied et al. 2017 ("a
+            fixed set of 16 samples"). Each pixel rotates them (Cranley and Patterson 1976) and visits them in an order
+            of its own. The mean over the cycle keeps the noise of 16 samples for ever: for the live filter only.
+``HASH``    Wang's integer hash (Wang 1997; Koskela et al. 2019 use it). Uncycled: references and statistics use this.
+
+Dimensions come in pairs, because 16 points in a base above 16 would not cover [0, 1): every pair uses bases 2 and 3, and
+its order of visit is scrambled by an XOR of its own, otherwise all pairs would be the same two numbers.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit, uint32
+
+HALTON, HASH = 0, 1
+
+PAIR_LIGHT, PAIR_BOUNCE, PAIR_SECOND_LIGHT, PAIR_SELECT = 0, 1, 2, 3
+"""Pairs of dimensions of one path: point on the first light, bounce direction, point on the second hit's light, and the
+choice of the two lights."""
+
+_TINY = np.float32(2.0**-24)
+_ONE, _TWO = np.float32(1.0), np.float32(2.0)
+_ZERO = np.float32(0.0)
+_TWO_PI = np.float32(2.0 * math.pi)
+
+
+def radical_inverse(base: int, count: int) -> np.ndarray:
+    """First ``count`` points of the van der Corput sequence in ``base``, (count,) float32 in [0, 1)."""
+    points = np.zeros(count)
+    for index in range(count):
+        scale, rest = 1.0, index
+        while rest:
+            scale /= base
+            points[index] += scale * (rest % base)
+            rest //= base
+    return points.astype(np.float32)
+
+
+_HALTON_2, _HALTON_3 = radical_inverse(2, 16), radical_inverse(3, 16)
+
+
+@njit(error_model="numpy")
+def wang(value):  # type: ignore[no-untyped-def]
+    """Wang's 32-bit integer hash."""
+    value = uint32(value)
+    value = uint32((value ^ uint32(61)) ^ (value >> uint32(16)))
+    value = uint32(value * uint32(9))
+    value = uint32(value ^ (value >> uint32(4)))
+    value = uint32(value * uint32(0x27D4EB2D))
+    return uint32(value ^ (value >> uint32(15)))
+
+
+@njit(error_model="numpy")
+def unit_float(bits):  # type: ignore[no-untyped-def]
+    """[0, 1) from 24 of 32 bits: a division by 2^32 in single precision would round up to 1."""
+    return np.float32(uint32(bits) >> uint32(8)) * _TINY
+
+
+@njit(error_model="numpy")
+def path_key(seed, pixel):  # type: ignore[no-untyped-def]
+    """Hash that stands for one pixel of one run."""
+    return wang(uint32(wang(uint32(seed) * uint32(0x9E3779B9) + uint32(1))) ^ uint32(pixel))
+
+
+@njit(error_model="numpy")
+def random_pair(key, frame, pair, generator):  # type: ignore[no-untyped-def]
+    """Two numbers in [0, 1) for one pair of dimensions of the path ``key`` in ``frame``."""
+    salt = uint32(pair + 1) * uint32(0x85EBCA6B)
+    if generator == HASH:
+        base = wang(uint32(wang(key ^ uint32(frame) * uint32(0xC2B2AE35))) ^ salt)
+        return unit_float(base), unit_float(wang(base ^ uint32(0x68BC21EB)))
+    base = wang(key ^ salt)
+    other = wang(base ^ uint32(0x68BC21EB))
+    point = (uint32(frame) ^ (other & uint32(15))) & uint32(15)  # low bits are not used by unit_float
+    x = _HALTON_2[point] + unit_float(base)
+    y = _HALTON_3[point] + unit_float(other)
+    if x >= _ONE:
+        x -= _ONE
+    if y >= _ONE:
+        y -= _ONE
+    return x, y
+
+
+@njit(error_model="numpy")
+def tangent_frame(nx, ny, nz):  # type: ignore[no-untyped-def]
+    """Two unit vectors that complete a unit normal to an orthonormal basis, from the normal alone.
+
+    Duff et al. 2017, "Building an Orthonormal Basis, Revisited". A direction built on it depends on the surface and on
+    the random numbers, never on the camera: this is what lets a shading be repeated exactly from another view.
+    """
+    sign = _ONE if nz >= _ZERO else -_ONE
+    a = -_ONE / (sign + nz)
+    b = nx * ny * a
+    return _ONE + sign * nx * nx * a, sign * b, -sign * nx, b, sign + ny * ny * a, -ny
+
+
+@njit(error_model="numpy")
+def sample_cosine(nx, ny, nz, u, v):  # type: ignore[no-untyped-def]
+    """Direction about the unit normal with density cos/π per solid angle, and its cosine."""
+    r = math.sqrt(u)
+    phi = _TWO_PI * v
+    x = r * np.float32(math.cos(phi))
+    y = r * np.float32(math.sin(phi))
+    z = math.sqrt(max(_ZERO, _ONE - u))
+    tx, ty, tz, bx, by, bz = tangent_frame(nx, ny, nz)
+    return x * tx + y * bx + z * nx, x * ty + y * by + z * ny, x * tz + y * bz + z * nz, z
+
+
+@njit(error_model="numpy")
+def sample_triangle(u, v):  # type: ignore[no-untyped-def]
+    """Barycentrics (of the second and third vertex) of a uniform point on a triangle.
+
+    Heitz 2019, "A Low-Distortion Map Between Triangle and Square".
+    """
+    if v > u:
+        b1 = u * np.float32(0.5)
+        return b1, v - b1
+    b2 = v * np.float32(0.5)
+    return u - b2, b2
+
+
+@njit(error_model="numpy")
+def sample_alias(u, threshold, alias):  # type: ignore[no-untyped-def]
+    """Index drawn from an alias table (Walker 1977) with one number in [0, 1)."""
+    count = threshold.shape[0]
+    scaled = u * np.float32(count)
+    index = min(int(scaled), count - 1)
+    if scaled - np.float32(index) < threshold[index]:
+        return index
+    return alias[index]
+
+
+def build_alias(weights: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Alias table of non-negative ``weights`` (n,): thresholds (n,) float32, aliases (n,) int32, pdf (n,) float32.
+
+    Vose 1991. The pdf returned is that of the rounded table, so that sample and pdf agree to the last bit. All-zero
+    weights give a uniform table.
+    """
+    weights = np.asarray(weights, dtype=np.float64)
+    count = len(weights)
+    total = weights.sum()
+    scaled = weights * (count / total) if total > 0 else np.ones(count)
+    threshold, alias = np.ones(count), np.arange(count, dtype=np.int32)
+    small = [i for i in range(count) if scaled[i] < 1.0]
+    large = [i for i in range(count) if scaled[i] >= 1.0]
+    remaining = scaled.copy()
+    while small and large:
+        low, high = small.pop(), large.pop()
+        threshold[low], alias[low] = remaining[low], high
+        remaining[high] -= 1.0 - remaining[low]
+        (small if remaining[high] < 1.0 else large).append(high)
+    rounded = threshold.astype(np.float32)
+    pdf = rounded.astype(np.float64).copy()
+    np.add.at(pdf, alias, 1.0 - rounded.astype(np.float64))
+    return rounded, alias, (pdf / count).astype(np.float32)

@@ -1,0 +1,120 @@
+"""What a scene is, before it is prepared for tracing.
+
+A :class:`Scene` is plain data in the file's own units and axes, float64, so that a model far from the origin loses
+nothing; :mod:`raytrace.compiled` subtracts :attr:`Scene.origin` and turns it into float32 arrays for the kernels.
+
+Conventions: texture coordinates have their origin at the lower left, and so do images here (row 0 is the bottom row);
+a loader whose format counts from the top flips both. Colours are linear Rec. 709 unless said otherwise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raytrace.camera import Camera
+
+F64 = NDArray[np.float64]
+F32 = NDArray[np.float32]
+I32 = NDArray[np.int32]
+
+Motion = Callable[[float], F64]
+"""Rigid object-to-world transform, (4, 4) float64 for column vectors, as a function of time in seconds."""
+
+
+@dataclass(frozen=True)
+class Texture:
+    """An image read by texture coordinates, repeated in both directions.
+
+    ``pixels``: (h, w, 3) uint8, row 0 = bottom row, sRGB-encoded (glTF 2.0, sec. 3.9.2: base colour and emissive
+    textures are).
+    """
+
+    name: str
+    pixels: NDArray[np.uint8]
+
+
+@dataclass(frozen=True)
+class Material:
+    """A diffuse (Lambertian) surface that may emit.
+
+    ``base_color``: linear reflectance in [0, 1], multiplied by ``base_texture`` where there is one.
+    ``emission``: radiance of the front face (of both faces where ``double_sided``), W/(m² sr) in the scene's own scale,
+    multiplied by ``emission_texture`` where there is one. Textures are indices into :attr:`Scene.textures`, -1 = none.
+    """
+
+    name: str
+    base_color: tuple[float, float, float] = (0.8, 0.8, 0.8)
+    base_texture: int = -1
+    emission: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    emission_texture: int = -1
+    double_sided: bool = False
+
+    @property
+    def emits(self) -> bool:
+        return max(self.emission) > 0.0
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Triangles of one object, which is what motion vectors and edge tests call an object.
+
+    ``vertices`` (V, 3) float64: world space, or object space where ``motion`` is given. ``faces`` (F, 3) int32.
+    ``normals`` (V, 3) float32, unit length, or None for flat shading. ``uvs`` (V, 2) float32 or None.
+    ``materials`` (F,) int32: index into :attr:`Scene.materials` per triangle.
+    """
+
+    name: str
+    vertices: F64
+    faces: I32
+    materials: I32
+    normals: F32 | None = None
+    uvs: F32 | None = None
+    motion: Motion | None = None
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Meshes, materials, textures, a camera, optionally a constant sky and a camera flight.
+
+    ``sky``: radiance of the constant sky, or None: then a ray that leaves the scene brings nothing.
+    ``flight``: camera at a time in seconds, for demos and measurements; None: the still camera.
+    ``notices``: what the loader repaired or approximated, one line each.
+    """
+
+    name: str
+    meshes: tuple[Mesh, ...]
+    materials: tuple[Material, ...]
+    camera: Camera
+    textures: tuple[Texture, ...] = ()
+    sky: tuple[float, float, float] | None = None
+    flight: Callable[[float], Camera] | None = None
+    notices: tuple[str, ...] = field(default=())
+
+    @property
+    def triangle_count(self) -> int:
+        return sum(len(m.faces) for m in self.meshes)
+
+    @property
+    def has_motion(self) -> bool:
+        return any(m.motion is not None for m in self.meshes)
+
+    def bounds(self) -> tuple[F64, F64]:
+        """Lower and upper corner of everything at time 0, each (3,) float64, world space."""
+        lower, upper = np.full(3, np.inf), np.full(3, -np.inf)
+        for mesh in self.meshes:
+            points = mesh.vertices[np.unique(mesh.faces)]
+            if mesh.motion is not None:
+                matrix = mesh.motion(0.0)
+                points = points @ matrix[:3, :3].T + matrix[:3, 3]
+            lower, upper = np.minimum(lower, points.min(0)), np.maximum(upper, points.max(0))
+        return lower, upper
+
+    @property
+    def origin(self) -> F64:
+        """Centre of the bounds, (3,) float64: subtracted before anything becomes float32."""
+        lower, upper = self.bounds()
+        return (lower + upper) / 2
