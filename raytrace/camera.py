@@ -55,6 +55,10 @@ class Camera:
     def with_jitter(self, jitter: tuple[float, float]) -> Camera:
         return replace(self, jitter=jitter)
 
+    def pixel_size(self, height: int) -> float:
+        """World units that one pixel of an image of ``height`` rows covers at depth 1."""
+        return 2.0 * math.tan(self.yfov / 2) / height
+
     def basis(self) -> tuple[F64, F64, F64]:
         """Right, up and forward unit vectors, (3,) float64 each, world space."""
         forward = np.array(self.forward, dtype=np.float64)

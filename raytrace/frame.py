@@ -37,6 +37,7 @@ class FramePacket:
     ``position``, ``prev_position`` (H, W, 4): xyz = surface point now and one frame ago, relative to the scene's origin;
     a = 1 on surfaces. None unless asked for.
 
+    ``pixel_size``: scene units that a pixel is wide at depth 1, 2 tan(yfov / 2) / height.
     ``timings``: seconds of wall time by stage name, of the tracer's own clock.
     """
 
@@ -54,6 +55,7 @@ class FramePacket:
     prev_position: F32 | None = None
     scene: str = ""
     cut: bool = False
+    pixel_size: float = 0.0
     jitter: tuple[float, float] = (0.0, 0.0)
     timings: dict[str, float] = field(default_factory=dict)
 

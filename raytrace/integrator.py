@@ -13,7 +13,7 @@ import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -101,14 +101,14 @@ class _Scratch(threading.local):
 
 @dataclass
 class Settings:
-    """How frames are traced. ``generator``: HALTON or HASH; ``threads`` 0 = one per core; ``tile`` pixels per tile."""
+    """How frames are traced. ``generator``: HALTON or HASH; ``threads`` 0 = one per core; ``tile`` pixels per tile;
+    ``positions``: frames carry world positions."""
 
     seed: int = 0
     generator: int = HALTON
     threads: int = 0
     tile: int = 16384
     positions: bool = False
-    extra: dict[str, float] = field(default_factory=dict)
 
 
 class Tracer:
@@ -137,6 +137,13 @@ class Tracer:
     def close(self) -> None:
         if self._pool is not None:
             self._pool.shutdown()
+
+    def warm_up(self) -> None:
+        """Compile, or load from the disk cache, every kernel that frames of this scene need."""
+        camera = self.scene.scene.camera
+        self.frame(0, camera, camera, (16, 16))
+        if self.scene.has_motion:
+            self.set_time(0.0, 0.0)
 
     def set_time(self, now: float, previous: float) -> None:
         """Move what moves to time ``now``; the previous positions are those at ``previous`` (seconds)."""
@@ -232,7 +239,7 @@ class Tracer:
 
         embree = self.for_each_tile(tile, count)
         timings = {"trace": time.perf_counter() - start, "embree": embree}
-        return self._packet(index, now, size, direct, indirect, outputs, cut, camera.jitter, timings)
+        return self._packet(index, now, size, direct, indirect, outputs, cut, camera, timings)
 
     def reference(
         self,
@@ -328,7 +335,7 @@ class Tracer:
         indirect: F32,
         out: Outputs,
         cut: bool,
-        jitter: tuple[float, float],
+        camera: Camera,
         timings: dict[str, float],
     ) -> FramePacket:
         width, height = size
@@ -352,6 +359,7 @@ class Tracer:
             prev_position=image(out.prev_position) if positions else None,
             scene=self.scene.scene.name,
             cut=cut,
-            jitter=jitter,
+            jitter=camera.jitter,
+            pixel_size=camera.pixel_size(height),
             timings=timings,
         )

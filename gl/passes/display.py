@@ -1,0 +1,53 @@
+"""From filtered illumination to the screen: modulate, tone map, encode."""
+
+from __future__ import annotations
+
+from config import Display
+from gl.graph import FragmentPass, Graph, In, Out, Tex, Uniform
+
+OPERATORS = {"none": 0, "reinhard": 1, "aces": 2}
+
+
+class Combine(FragmentPass):
+    """Direct plus indirect before a filter that takes them together; with the albedo if it is to see that, too."""
+
+    shader = "display/combine.frag"
+    in_direct = In("irradiance")
+    in_indirect = In("irradiance", optional=True)
+    in_albedo = In("divisor of the irradiance", optional=True)
+    out_color = Out("rgba32f", "the sum, times albedo where that is connected")
+
+
+class Modulate(FragmentPass):
+    """Full radiance: (direct + indirect) x albedo + emission. Schied et al. 2017, sec. 4."""
+
+    shader = "display/modulate.frag"
+    in_direct = In("irradiance; radiance where no albedo is connected")
+    in_indirect = In("irradiance", optional=True)
+    in_albedo = In("divisor of the irradiance", optional=True)
+    in_emission = In("radiance emitted by the surface seen or by the sky")
+    out_radiance = Out("rgba32f", "linear radiance")
+
+
+class Tonemap(FragmentPass):
+    """Exposure and tone curve."""
+
+    shader = "display/tonemap.frag"
+    in_radiance = In("linear radiance")
+    out_color = Out("rgba16f", "tone-mapped colour, linear")
+    u_scale = Uniform("float", "> 0, 2 to the exposure in EV")
+
+
+class Encode(FragmentPass):
+    """8-bit sRGB."""
+
+    shader = "display/encode.frag"
+    in_color = In("tone-mapped colour, linear")
+    out_color = Out("rgba8", "sRGB")
+
+
+def tonemap(g: Graph, radiance: Tex, p: Display) -> Tex:
+    """Add exposure and tone curve."""
+    return g.add(
+        Tonemap(u_scale=2.0**p.exposure, defines={"OPERATOR": OPERATORS[p.tonemap]}), in_radiance=radiance
+    ).out_color

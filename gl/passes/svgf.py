@@ -1,0 +1,105 @@
+"""SVGF. Schied et al. 2017, "Spatiotemporal Variance-Guided Filtering: Real-Time Reconstruction for Path-Traced Global
+Illumination"; the wavelet after Dammertz et al. 2010, "Edge-Avoiding À-Trous Wavelet Transform".
+
+Deviations from the paper:
+
+* Accumulation as described in :mod:`gl.passes.temporal`.
+* The variance estimated in space is exaggerated by 4 / h while the history h is shorter than four frames, as the known
+  implementations do; the paper gives no factor.
+* The denominator of the depth weight has a floor of a tenth of a pixel's width per pixel of distance: with the paper's
+  constant a surface facing the camera, whose depth gradient is 0, would not be filtered at all.
+* What travels between the iterations is the standard deviation, since a variance leaves the range of half precision.
+"""
+
+from __future__ import annotations
+
+from config import Svgf
+from gl.graph import FragmentPass, Graph, In, Out, Tex, Uniform
+from gl.passes.temporal import REPROJECTION, Guides, accumulate, reproject
+
+
+class Variance(FragmentPass):
+    """Replace the temporal variance by a spatial estimate where the history is shorter than four frames (sec. 4.2)."""
+
+    shader = "svgf/variance.frag"
+    in_color = In("rgb: irradiance; a: standard deviation over time")
+    in_moments = In("first and second moment of luminance", optional=True)
+    in_surface = In("xyz: shading normal, world; w: depth, scene units")
+    in_gradient = In("depth change per pixel, scene units")
+    in_reprojection = In(REPROJECTION, optional=True)
+    out_color = Out("rgba16f", "rgb: irradiance, unchanged; a: standard deviation")
+    u_sigma_z = Uniform("float", "> 0, depth edge-stopping")
+    u_pixel_size = Uniform("float", "> 0, scene units a pixel is wide at depth 1")
+
+
+class Atrous(FragmentPass):
+    """One iteration of the wavelet, 5x5 taps at a distance of ``step`` pixels (sec. 4.3 and 4.4, eq. 3 to 5)."""
+
+    shader = "svgf/atrous.frag"
+    in_color = In("rgb: irradiance; a: standard deviation of its luminance")
+    in_surface = In("xyz: shading normal, world; w: depth, scene units")
+    in_gradient = In("depth change per pixel, scene units")
+    out_color = Out("rgba16f", "filtered: rgb: irradiance; a: standard deviation of its luminance")
+    u_sigma_z = Uniform("float", "> 0, depth edge-stopping")
+    u_sigma_n = Uniform("float", "> 0, exponent of the normals' cosine")
+    u_sigma_l = Uniform("float", "> 0, luminance edge-stopping in standard deviations")
+    u_pixel_size = Uniform("float", "> 0, scene units a pixel is wide at depth 1")
+
+    def __init__(self, p: Svgf, step: int, pixel_size: float) -> None:
+        # A power of two is squared into place: pow() costs more than seven products.
+        squarings = p.sigma_n.bit_length() - 1
+        super().__init__(
+            defines={
+                "STEP": step,
+                "SIGMA_N_SQUARINGS": squarings if p.sigma_n == 1 << squarings else -1,
+                "LUMINANCE_STOP": int(p.variance_guided),
+            },
+            u_sigma_z=p.sigma_z,
+            u_sigma_n=float(p.sigma_n),
+            u_sigma_l=p.sigma_l,
+            u_pixel_size=pixel_size,
+        )
+
+
+def svgf(g: Graph, signals: dict[str, Tex], guides: Guides, p: Svgf, pixel_size: float) -> dict[str, Tex]:
+    """Filter each of ``signals`` (noisy irradiance by name, "direct", "indirect" or "both"); returns the clean ones.
+
+    All of them share one reprojection. Histories are named by the set of signals, so that filtering them together
+    after filtering them apart begins with a new history, as it must.
+    """
+    names = "svgf." + "+".join(signals)
+    with g.scope("svgf"):
+        found = reproject(g, guides, names, p, pixel_size) if p.temporal else None
+        clean: dict[str, Tex] = {}
+        for signal, noisy in signals.items():
+            with g.scope(signal):
+                clean[signal] = _filter_signal(g, f"{names}.{signal}", noisy, found, guides, p, pixel_size)
+        return clean
+
+
+def _filter_signal(
+    g: Graph, name: str, noisy: Tex, reprojection: Tex | None, guides: Guides, p: Svgf, pixel_size: float
+) -> Tex:
+    x = noisy
+    estimate: dict[str, Tex] = {}
+    history = None
+    if reprojection is not None:
+        history = g.history(name, "rgba16f")
+        x, moments = accumulate(g, x, reprojection, history, p)
+        estimate = {"in_moments": moments, "in_reprojection": reprojection}
+    # Without time there is no other variance than the one in space; without guidance by variance there is none at all.
+    if p.variance_guided:
+        stage = Variance(u_sigma_z=p.sigma_z, u_pixel_size=pixel_size)
+        shape = {"in_surface": guides.surface, "in_gradient": guides.gradient}
+        unfiltered, x = x, g.add(stage, in_color=x, **shape, **estimate).out_color
+    else:
+        unfiltered = x
+    if history is not None and p.feedback < 0:
+        g.feed(history, unfiltered)
+    for i in range(p.iterations):
+        x = g.add(
+            Atrous(p, 1 << i, pixel_size), f"atrous{i}", in_color=x, in_surface=guides.surface, in_gradient=guides.gradient
+        ).out_color
+        if history is not None and i == p.feedback:
+            g.feed(history, x)  # no copy: x is written into the history's other half
+    return x

@@ -1,0 +1,119 @@
+"""Temporal reprojection and accumulation. Schied et al. 2017, "Spatiotemporal Variance-Guided Filtering", sec. 4.1.
+
+Shared by every method that keeps a history: :class:`Reproject` decides once per frame which texels of the last frame
+saw the same surface, :class:`Accumulate` then blends one signal.
+
+Deviations from the paper:
+
+* The new sample's weight is max(1 / (N + 1), alpha), a plain running mean first, as Koskela et al. 2019 have it. With
+  a constant alpha the first sample after a disocclusion keeps most of the weight for many frames.
+* The expected previous depth comes with the motion vector, so that a camera or an object moving along the line of sight
+  keeps its history (the "2.5D" vectors of NRD).
+* The length of the history is interpolated like the colour, and shortened where only part of the footprint is valid or
+  where the surface was seen at a much more grazing angle.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from gl.graph import FragmentPass, Graph, History, In, Out, Prev, Tex, Uniform
+
+REPROJECTION = "xy: position in the last frame, texel units; z: mask of valid taps; w: history length N, frames"
+GUIDE = "x: normal, octahedral; y: depth; z: object id; w: history length h + cosine of the view angle"
+
+
+class Reproject(FragmentPass):
+    """Find each surface point in the last frame and test the texels there: object, depth, normal.
+
+    A 2x2 bilinear footprint whose failing taps are dropped, else the 3x3 around it, else no history (N = 0).
+    """
+
+    shader = "temporal/reproject.frag"
+    in_motion = In("xy: previous uv - uv; z: expected previous depth, scene units; w: object id, -1 = miss")
+    in_surface = In("xyz: shading normal, world; w: depth, scene units")
+    in_gradient = In("depth change per pixel, scene units")
+    in_prev_normal = In("xyz: the point's normal in the last frame, world; scenes in which something moves", optional=True)
+    prev_guide = Prev(GUIDE)
+    out_reprojection = Out("rgba32f", REPROJECTION)
+    out_guide = Out("rgba32f", GUIDE)
+    u_depth_tolerance = Uniform("float", "[0;1] accepted depth difference relative to depth, on top of a pixel's slope")
+    u_normal_tolerance = Uniform("float", "[-1;1] smallest accepted cosine between the normals")
+    u_max_history = Uniform("float", "[1;255] frames, the longest history that is counted")
+    u_pixel_size = Uniform("float", "> 0, scene units a pixel is wide at depth 1")
+
+
+class Accumulate(FragmentPass):
+    """Blend one signal and its luminance moments with the history."""
+
+    shader = "temporal/accumulate.frag"
+    in_color = In("this frame's sample, demodulated irradiance")
+    in_reprojection = In(REPROJECTION)
+    prev_color = Prev("accumulated irradiance of the last frame, a unused")
+    prev_moments = Prev("accumulated first and second moment of luminance")
+    # A standard deviation, not a variance: radiance that half precision holds can have a variance that it does not.
+    out_color = Out("rgba16f", "rgb: accumulated irradiance; a: standard deviation of one sample's luminance over time")
+    out_moments = Out("rg32f", "first and second moment of luminance; a square needs single precision")
+    u_alpha = Uniform("float", "[0;1] smallest weight of the new sample in the colour")
+    u_alpha_moments = Uniform("float", "[0;1] smallest weight of the new sample in the moments")
+
+
+class TemporalSettings(Protocol):
+    """The parameters of accumulation, which every method's section has."""
+
+    @property
+    def alpha(self) -> float: ...
+    @property
+    def alpha_moments(self) -> float: ...
+    @property
+    def max_history(self) -> int: ...
+    @property
+    def depth_tolerance(self) -> float: ...
+    @property
+    def normal_tolerance(self) -> float: ...
+
+
+class Guides:
+    """Handles of the noise-free inputs that the filters share."""
+
+    def __init__(self, g: Graph, moving: bool) -> None:
+        self.motion = g.import_("frame.motion", "rgba32f")
+        self.surface = g.import_("frame.surface", "rgba32f")
+        self.gradient = g.import_("frame.gradient", "rg32f")
+        self.optional = {"in_prev_normal": g.import_("frame.prev_normal", "rgba32f")} if moving else {}
+
+
+def reproject(g: Graph, guides: Guides, name: str, p: TemporalSettings, pixel_size: float) -> Tex:
+    """Add the reprojection of the frame with its own history, ``name.guide``; returns the ``REPROJECTION`` texture."""
+    history = g.history(f"{name}.guide", "rgba32f")
+    found = g.add(
+        Reproject(
+            u_depth_tolerance=p.depth_tolerance,
+            u_normal_tolerance=p.normal_tolerance,
+            u_max_history=float(p.max_history),
+            u_pixel_size=pixel_size,
+        ),
+        in_motion=guides.motion,
+        in_surface=guides.surface,
+        in_gradient=guides.gradient,
+        prev_guide=history,
+        **guides.optional,
+    )
+    g.feed(history, found.out_guide)
+    return found.out_reprojection
+
+
+def accumulate(
+    g: Graph, color: Tex, reprojection: Tex, history: History, p: TemporalSettings, fmt: str = "rgba16f"
+) -> tuple[Tex, Tex]:
+    """Add the accumulation of one signal into ``history``, which the caller feeds; returns colour and moments."""
+    moments = g.history(f"{history.name}.moments", "rg32f")
+    blended = g.add(
+        Accumulate(u_alpha=p.alpha, u_alpha_moments=p.alpha_moments, formats={"out_color": fmt}),
+        in_color=color,
+        in_reprojection=reprojection,
+        prev_color=history,
+        prev_moments=moments,
+    )
+    g.feed(moments, blended.out_moments)
+    return blended.out_color, blended.out_moments

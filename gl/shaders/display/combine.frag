@@ -1,0 +1,23 @@
+// Sum of the noisy signals before a filter takes them together, and their albedo where the filter is to see it.
+
+uniform sampler2D in_direct;
+#if HAS_IN_INDIRECT
+uniform sampler2D in_indirect;
+#endif
+#if HAS_IN_ALBEDO
+uniform sampler2D in_albedo;
+#endif
+
+layout(location = 0) out vec4 out_color;
+
+void main() {
+    ivec2 p = ivec2(gl_FragCoord.xy);
+    vec3 c = texelFetch(in_direct, p, 0).rgb;
+#if HAS_IN_INDIRECT
+    c += texelFetch(in_indirect, p, 0).rgb;
+#endif
+#if HAS_IN_ALBEDO
+    c *= texelFetch(in_albedo, p, 0).rgb;
+#endif
+    out_color = vec4(c, 1.0);
+}

@@ -1,0 +1,100 @@
+// One iteration of the edge-avoiding à-trous wavelet. Dammertz et al. 2010; Schied et al. 2017, sec. 4.3 and 4.4.
+//
+// STEP: distance of the taps. SIGMA_N_SQUARINGS: log2 of the normal exponent, or -1 where it is no power of two.
+// LUMINANCE_STOP: 0 leaves out w_l. The taps are written out: constants then fold, and a software rasteriser takes 0.6 of
+// the time of a loop.
+
+#include "common/color.glsl"
+#include "common/finite.glsl"
+
+uniform sampler2D in_color;   // rgb irradiance, standard deviation of its luminance
+uniform sampler2D in_surface; // normal, depth
+uniform sampler2D in_gradient;
+uniform float u_sigma_z;
+uniform float u_sigma_n;
+uniform float u_sigma_l;
+uniform float u_pixel_size;
+
+layout(location = 0) out vec4 out_color;
+
+const float LOG2_E = 1.44269504;
+
+ivec2 p, size;
+vec4 surface;
+vec2 gradient;
+float l, inverse_l, floor_z;
+vec3 color;
+float weight, variance;
+
+float normal_weight(vec3 n) {
+    float w = max(dot(surface.xyz, n), 0.0);
+#if SIGMA_N_SQUARINGS >= 0
+    for (int i = 0; i < SIGMA_N_SQUARINGS; ++i) w *= w;
+#else
+    w = pow(w, u_sigma_n);
+#endif
+    return w;
+}
+
+void tap(ivec2 offset, float kernel, float inverse_z) {
+    ivec2 q = p + offset;
+    bool inside = all(lessThan(uvec2(q), uvec2(size)));
+    q = clamp(q, ivec2(0), size - 1);
+    vec4 c = texelFetch(in_color, q, 0);
+    vec4 s = texelFetch(in_surface, q, 0);
+    float e = abs(surface.w - s.w) * inverse_z;
+#if LUMINANCE_STOP
+    e += abs(l - luminance(c.rgb)) * inverse_l;
+#endif
+    float w = kernel * normal_weight(s.xyz) * exp2(-e);
+    w = inside ? w : 0.0;
+    color += w * c.rgb;
+    variance += (w * c.a) * (w * c.a);
+    weight += w;
+}
+
+// Two opposite taps share the denominator of w_z. Its floor is a tenth of a pixel's width: on a plane that faces the
+// camera the gradient is 0, and rounding of the depth must not cut the surface in pieces.
+void pair(int dx, int dy, float kernel) {
+    ivec2 offset = ivec2(dx, dy) * STEP;
+    vec2 d = vec2(offset);
+    float inverse_z = LOG2_E / (u_sigma_z * abs(dot(gradient, d)) + floor_z * length(d) + 1e-30);
+    tap(offset, kernel, inverse_z);
+    tap(-offset, kernel, inverse_z);
+}
+
+void main() {
+    p = ivec2(gl_FragCoord.xy);
+    size = textureSize(in_color, 0);
+    vec4 centre = texelFetch(in_color, p, 0);
+    surface = texelFetch(in_surface, p, 0);
+    gradient = texelFetch(in_gradient, p, 0).xy;
+    floor_z = 0.1 * u_pixel_size * surface.w;
+    l = luminance(centre.rgb);
+
+#if LUMINANCE_STOP
+    // Variance blurred by a 3x3 Gaussian, for w_l only: a single estimate is too noisy to steer by.
+    float blurred = 0.0;
+    for (int y = -1; y <= 1; ++y)
+        for (int x = -1; x <= 1; ++x) {
+            float sigma = texelFetch(in_color, clamp(p + ivec2(x, y), ivec2(0), size - 1), 0).a;
+            blurred += sigma * sigma * (x == 0 ? 0.5 : 0.25) * (y == 0 ? 0.5 : 0.25);
+        }
+    inverse_l = LOG2_E / (u_sigma_l * sqrt(blurred) + 1e-6);
+#endif
+
+    // B3 spline, outer product of (1/16, 1/4, 3/8, 1/4, 1/16), scaled to 1 at the centre, whose weight is never 0.
+    const float A = 2.0 / 3.0, B = 1.0 / 6.0;
+    color = centre.rgb;
+    variance = centre.a * centre.a;
+    weight = 1.0;
+    pair(1, 0, A);      pair(0, 1, A);
+    pair(1, 1, A * A);  pair(1, -1, A * A);
+    pair(2, 0, B);      pair(0, 2, B);
+    pair(2, 1, A * B);  pair(2, -1, A * B);
+    pair(1, 2, A * B);  pair(1, -2, A * B);
+    pair(2, 2, B * B);  pair(2, -2, B * B);
+
+    // Var = Σ w² var / (Σ w)²: the standard deviation is what half precision can hold.
+    out_color = vec4(color / weight, min(sqrt(variance) / weight, HALF_LIMIT));
+}

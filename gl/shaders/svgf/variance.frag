@@ -1,0 +1,66 @@
+// Variance in space where the history is too short for one in time. Schied et al. 2017, sec. 4.2.
+
+#include "common/color.glsl"
+#include "common/finite.glsl"
+
+uniform sampler2D in_color;   // rgb, standard deviation over time
+#if HAS_IN_MOMENTS
+uniform sampler2D in_moments; // first and second luminance moment
+uniform sampler2D in_reprojection; // w: history length before this frame
+#endif
+uniform sampler2D in_surface;
+uniform sampler2D in_gradient;
+uniform float u_sigma_z;
+uniform float u_pixel_size;
+
+layout(location = 0) out vec4 out_color;
+
+const float MIN_HISTORY = 4.0;
+
+#if HAS_IN_MOMENTS
+vec2 moments_at(ivec2 q) { return texelFetch(in_moments, q, 0).xy; }
+float history_at(ivec2 q) { return texelFetch(in_reprojection, q, 0).w + 1.0; }
+#else
+vec2 moments_at(ivec2 q) {
+    vec3 c = texelFetch(in_color, q, 0).rgb;
+    float l = is_finite(c) ? luminance(clamp_radiance(c)) : 0.0;
+    return vec2(l, l * l);
+}
+float history_at(ivec2 q) { return 1.0; }
+#endif
+
+void main() {
+    ivec2 p = ivec2(gl_FragCoord.xy);
+    vec4 color = texelFetch(in_color, p, 0);
+#if !HAS_IN_MOMENTS
+    color = is_finite(color.rgb) ? vec4(clamp_radiance(color.rgb), 0.0) : vec4(0.0);
+#endif
+    vec4 surface = texelFetch(in_surface, p, 0);
+    float h = history_at(p);
+
+    // 7x7 bilateral window over the moments. The loop is empty, not masked, where the history is long enough: a
+    // software rasteriser runs both sides of a branch.
+    int last = h < MIN_HISTORY && surface.w > 0.0 ? 48 : -1;
+    vec3 sum = vec3(0.0);
+    ivec2 size = textureSize(in_color, 0);
+    vec2 gradient = texelFetch(in_gradient, p, 0).xy;
+    float floor_z = 0.1 * u_pixel_size * surface.w;
+    for (int i = 0; i <= last; ++i) {
+        ivec2 d = ivec2(i % 7, i / 7) - 3;
+        ivec2 q = p + d;
+        if (any(greaterThanEqual(uvec2(q), uvec2(size)))) continue;
+        vec4 s = texelFetch(in_surface, q, 0);
+        float n = max(dot(surface.xyz, s.xyz), 0.0);
+        n *= n; n *= n; n *= n; n *= n; n *= n; n *= n; n *= n; // ^128
+        float range = u_sigma_z * abs(dot(gradient, vec2(d))) + floor_z * length(vec2(d)) + 1e-30;
+        float w = n * exp(-abs(surface.w - s.w) / range);
+        sum += w * vec3(moments_at(q), 1.0);
+    }
+    if (last >= 0 && sum.z > 0.0) {
+        vec2 m = sum.xy / sum.z;
+        // Few frames make a poor estimate, and a low one freezes the noise: exaggerate while the history is short.
+        float variance = max(m.y - m.x * m.x, 0.0) * MIN_HISTORY / h;
+        color.a = min(sqrt(variance), HALF_LIMIT);
+    }
+    out_color = color;
+}
