@@ -45,7 +45,7 @@ def _materials(stage: Stage) -> None:
         ("rust", "#b4532f"), ("cream", "#efe6d2"), ("throw", "#7c8f9c"),
     ):  # fmt: skip
         stage.material(name, linear(code), cloth)
-    stage.material("drapes", linear("#4a9a96"), drapery)
+    stage.material("drapes", linear("#6a97a3"), drapery)
     stage.material("rug", (1.0, 1.0, 1.0), stage.texture("rug", pictures.rug()))
     stage.material("spines", (1.0, 1.0, 1.0), stage.texture("spines", pictures.spines()))
     stage.material("paintings", (1.0, 1.0, 1.0), stage.texture("paintings", pictures.paintings()))
@@ -57,15 +57,15 @@ def _materials(stage: Stage) -> None:
     stage.material("ivy leaf", linear("#f4f6d0"), leaf)
     for name, code in (
         ("pages", "#e8dfc8"), ("night", "#141c2c"), ("brass", "#c79a4b"), ("iron", "#2c2b2b"), ("bark", "#3a2a20"),
-        ("enamel", "#2e6b62"), ("gold", "#b98d43"), ("black", "#242220"), ("card", "#f2ede0"), ("terracotta", "#b9663f"),
+        ("enamel", "#2b5a50"), ("gold", "#b98d43"), ("black", "#242220"), ("card", "#f2ede0"), ("terracotta", "#b9663f"),
         ("earth", "#37281e"), ("stem", "#5d6b35"), ("china", "#f2f0e8"), ("celadon", "#8fb59f"), ("cobalt", "#2f4f9a"),
         ("tea", "#7a3d14"), ("orange", "#e5862a"), ("apple", "#b5302a"), ("steel", "#8d8f92"),
         ("train red", "#bf2f26"), ("train green", "#3f7d4a"), ("train yellow", "#e0b13a"), ("train blue", "#33639a"),
     ):  # fmt: skip
         stage.material(name, linear(code))
     for name, radiance in (
-        ("pendant light", (80.0, 63.0, 44.0)), ("ceiling light", (62.0, 51.0, 38.0)), ("shade light", (11.0, 7.4, 4.0)),
-        ("bulb light", (36.0, 26.0, 15.0)), ("ember", (22.0, 5.0, 0.8)), ("flame", (30.0, 13.0, 2.8)),
+        ("pendant light", (75.0, 59.0, 41.0)), ("ceiling light", (80.0, 65.0, 48.0)), ("shade light", (13.0, 8.8, 4.8)),
+        ("bulb light", (30.0, 22.0, 13.0)), ("flame", (20.0, 8.0, 1.6)),
     ):  # fmt: skip
         stage.material(name, (0.5, 0.5, 0.5), emission=radiance)
 
@@ -131,8 +131,8 @@ def _around(stage: Stage) -> None:
 def _lights(stage: Stage) -> None:
     for k, (x, z) in enumerate(((-1.6, -0.98), (1.6, -0.98), (0.0, 1.85))):
         stage.add(f"ceiling lamp {k + 1}", placed(lamps.plafond(), 0.0, x, room.HEIGHT, z))
-    stage.add("standing lamp", placed(lamps.standing_lamp(), 0.0, -2.5, 0.0, -1.72))
-    stage.add("table lamp", against(lamps.table_lamp("porcelain"), "right", 0.15, 0.784, 0.21))
+    stage.add("standing lamp", placed(lamps.standing_lamp(), 0.0, -2.42, 0.0, -1.68))
+    stage.add("table lamp", against(lamps.table_lamp("porcelain"), "right", 0.15, 0.784, 0.26))
     pivot = (_TABLE_X, room.BEAM_UNDERSIDE, _TABLE_Z - 0.1)
     stage.add("hanging lamp", lamps.pendant(0.92), swing(pivot, "z", 6.0, 4.0))
 

@@ -1,55 +1,52 @@
-"""The interior's lights. Emissive parts are few triangles, because a path tracer picks among them."""
+"""The interior's lights.
+
+Emissive parts are few triangles, because a path tracer picks among them, and they keep their distance from whatever
+they shine on: next-event estimation at a point close to a light is an unbounded 1/r².
+"""
 
 from __future__ import annotations
 
-from assets.shapes import Shape, join
-from assets.stage import Part
-from assets.surfaces import curve, lathe, ring, rod
+from assets.shapes import join
+from assets.stage import Part, placed
+from assets.surfaces import curve, lathe, rod
 
 
 def pendant(drop: float) -> list[Part]:
-    """An enamelled shade that hangs from the origin on a cord; its glowing disc is ``drop`` below and looks down."""
-    outside = curve([(0.24, 0.0), (0.225, 0.06), (0.15, 0.14), (0.05, 0.18), (0.032, 0.23)], 14)
-    inside = curve([(0.04, 0.17), (0.14, 0.125), (0.215, 0.055), (0.234, 0.0)], 10)
-    shade = lathe([(0.0, 0.172), *inside.tolist(), *outside.tolist(), (0.0, 0.235)], 40)
-    disc = lathe([(0.0, 0.022), (0.2, 0.022)], 24)
+    """An enamelled shade that hangs from the origin on a cord; its mouth, ``drop`` below, is closed by a glowing disc."""
+    outside = curve([(0.24, 0.0), (0.225, 0.06), (0.15, 0.14), (0.05, 0.18), (0.032, 0.23)], 16)
+    shade = lathe([(0.0, 0.004), (0.236, 0.004), *outside.tolist(), (0.0, 0.235)], 48)
+    disc = lathe([(0.0, -0.001), (0.232, -0.001)], 24)
     cord = rod(0.004, drop - 0.2, 8).moved(y=0.215)
     rose = lathe([(0.0, drop - 0.03), (0.03, drop - 0.028), (0.05, drop + 0.01), (0.0, drop + 0.01)], 24)
     parts: list[Part] = [(shade, "enamel"), (disc, "pendant light"), (join([cord, rose]), "brass")]
-    return [(shape.moved(y=-drop), material) for shape, material in parts]
+    return placed(parts, y=-drop)
 
 
 def plafond() -> list[Part]:
-    """A shallow ceiling lamp: a brass ring with a glowing bowl below it; y = 0 is the ceiling."""
-    bowl = lathe([(0.0, -0.095), (0.14, -0.078), (0.225, -0.02)], 16, 180.0)
-    rim = lathe([(0.0, -0.024), (0.245, -0.024), (0.25, -0.018), (0.25, 0.01), (0.0, 0.01)], 40)
-    return [(bowl, "ceiling light"), (rim, "brass")]
+    """A flat ceiling lamp, a glowing disc in a brass ring; y = 0 is the ceiling."""
+    disc = lathe([(0.0, -0.038), (0.26, -0.036)], 24, 180.0)
+    rim = lathe([(0.0, -0.03), (0.262, -0.03), (0.27, -0.036), (0.284, -0.034), (0.29, 0.01), (0.0, 0.01)], 48)
+    return [(disc, "ceiling light"), (rim, "brass")]
 
 
 def _shade(low: float, high: float, height: float) -> list[Part]:
-    """A glowing drum about the y axis from y = 0, with a cloth hem above and below and a bright opening each way."""
-    drum = lathe([(low, 0.0), (high, height)], 20, 180.0)
-    hems = [ring(low, 0.008, 40, 8), ring(high, 0.008, 40, 8).moved(y=height)]
-    below = lathe([(0.0, 0.012), (low - 0.001, 0.012)], 20)
-    above = lathe([(high - 0.001, height - 0.012), (0.0, height - 0.012)], 20)
-    return [(drum, "shade light"), (join([below, above]), "bulb light"), (join(hems), "cream")]
+    """A glowing drum about the y axis from y = 0, brighter above, closed below, where its foot is too near."""
+    drum = lathe([(low, 0.0), (high, height)], 24, 180.0)
+    above = lathe([(high, height), (0.0, height)], 24)
+    below = lathe([(0.0, 0.0), (low, 0.0)], 24)
+    return [(drum, "shade light"), (above, "bulb light"), (below, "cream")]
 
 
 def standing_lamp() -> list[Part]:
     """A floor lamp, 1.62 m high."""
     pole = [(0, -0.001), (0.15, -0.001), (0.152, 0.012), (0.13, 0.022), (0.025, 0.034), (0.012, 0.06), (0.012, 0.7)]
     pole += [(0.02, 0.715), (0.02, 0.735), (0.012, 0.75), (0.012, 1.36), (0.0, 1.36)]
-    return [(lathe(pole, 32), "brass"), *_raised(_shade(0.215, 0.15, 0.28), 1.34)]
+    return [(lathe(pole, 32), "brass"), *placed(_shade(0.2, 0.155, 0.28), y=1.34)]
 
 
 def table_lamp(foot: str) -> list[Part]:
-    """A lamp on a pot-bellied foot, 0.52 m high; y = 0 is the table."""
+    """A lamp on a pot-bellied foot, 0.55 m high; y = 0 is the table."""
     belly = curve([(0.055, 0.0), (0.06, 0.012), (0.05, 0.03), (0.1, 0.11), (0.085, 0.19), (0.03, 0.25), (0.026, 0.28)], 18)
     base = lathe([(0.0, -0.001), (0.055, -0.001), *belly[1:].tolist(), (0.0, 0.281)], 40)
-    neck = rod(0.01, 0.06, 12).moved(y=0.275)
-    return [(base, foot), (neck, "brass"), *_raised(_shade(0.165, 0.115, 0.2), 0.315)]
-
-
-def _raised(parts: list[Part], y: float) -> list[Part]:
-    moved: list[tuple[Shape, str]] = [(shape.moved(y=y), material) for shape, material in parts]
-    return moved
+    neck = rod(0.01, 0.09, 12).moved(y=0.275)
+    return [(base, foot), (neck, "brass"), *placed(_shade(0.145, 0.11, 0.19), y=0.35)]

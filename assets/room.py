@@ -12,9 +12,9 @@ from typing import Literal
 
 import numpy as np
 
-from assets.shapes import Shape, block, box, join, prism, quad
+from assets.shapes import Shape, block, join, prism, quad
 from assets.stage import Part, Stage, placed
-from assets.surfaces import ball, curve, lathe, rod, sheet, tube
+from assets.surfaces import ball, curve, rod, sheet, tube
 from raytrace.scene import F64
 
 Wall = Literal["back", "left", "right", "front"]
@@ -126,7 +126,7 @@ def _fireplace() -> list[Part]:
 
 
 def _grate() -> list[Part]:
-    """An iron basket with logs, embers and flames, in the frame of the back wall."""
+    """An iron basket with burning logs, in the frame of the back wall."""
     irons = []
     for x in np.linspace(-0.3, 0.3, 7):
         bar = curve([(x, 0.14, 0.1), (x, 0.13, 0.3), (x, 0.15, 0.36), (x, 0.24, 0.38)], 10)
@@ -142,19 +142,21 @@ def _grate() -> list[Part]:
         along = np.linspace(-0.27, 0.27, 9)
         path = np.stack([along, 0.008 * np.sin(9 * along + 3 * yaw), 0.01 * np.cos(7 * along)], axis=1)
         logs.append(tube(path, size * rng.uniform(0.88, 1.1, 9), 14).turned("y", yaw).moved(x, y, z))
-    embers = [
-        box((0.05, 0.03, 0.04)).turned("y", 37.0 * k).moved(-0.18 + 0.12 * k, 0.16 + 0.012 * (k % 2), 0.23)
-        for k in range(4)
-    ]
     flames = [
-        lathe(_flame(0.036 * size, 0.2 * size), 6, 180.0).turned("z", lean).moved(x, 0.25, z)
-        for x, z, size, lean in ((-0.13, 0.24, 0.85, 6), (0.0, 0.22, 1.3, -3), (0.13, 0.26, 0.95, 5))
-    ]
-    return [(join(irons), "iron"), (join(logs), "bark"), (join(embers), "ember"), (join(flames), "flame")]
+        _flame(height, bend).turned("y", turn).moved(x, 0.29, z)
+        for x, z, height, bend, turn in (
+            (-0.16, 0.24, 0.17, 0.035, 40), (-0.05, 0.21, 0.3, -0.03, 80), (0.05, 0.26, 0.21, 0.045, 10),
+            (0.15, 0.22, 0.24, 0.03, -30),
+        )
+    ]  # fmt: skip
+    return [(join(irons), "iron"), (join(logs), "bark"), (join(flames), "flame")]
 
 
-def _flame(radius: float, height: float) -> list[tuple[float, float]]:
-    return [(0.0, 0.0), (0.8 * radius, 0.12 * height), (radius, 0.3 * height), (0.55 * radius, 0.62 * height), (0.0, height)]
+def _flame(height: float, bend: float) -> Shape:
+    """A tongue of fire from y = 0, that sways by ``bend`` along x: few triangles, because it is a light."""
+    t = np.array([0.0, 0.18, 0.42, 0.7, 1.0])
+    path = np.stack([bend * np.sin(4.5 * t), height * t, np.zeros(5)], axis=1)
+    return tube(path, 0.16 * height * np.array([0.35, 0.85, 1.0, 0.55, 0.06]), 5)
 
 
 def _window() -> list[Part]:

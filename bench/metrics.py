@@ -6,6 +6,8 @@ bypass the filters, and their brightness would hide every other error).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,6 +19,11 @@ def rmse(image: Image, reference: Image, mask: Mask) -> float:
     """Root of the mean squared difference over the pixels of ``mask`` and all channels."""
     difference = image[mask].astype(np.float64) - reference[mask]
     return float(np.sqrt(np.mean(difference * difference)))
+
+
+def pooled(errors: Sequence[float]) -> float:
+    """RMSE of a sequence: root of the mean of the frames' squared ``errors``, every frame counting alike."""
+    return float(np.sqrt(np.mean(np.square(errors))))
 
 
 def display_curve(image: Image) -> NDArray[np.float64]:

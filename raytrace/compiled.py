@@ -21,20 +21,26 @@ F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 I32 = NDArray[np.int32]
 
-MATERIAL, OBJECT, LIGHT = 0, 1, 2
+MATERIAL, OBJECT, LIGHT, SMOOTH = 0, 1, 2, 3
 """Columns of :attr:`CompiledScene.triangle_info`."""
+
+CORNERS, NORMALS, FACE_NORMAL, OFFSET, RECORD = 0, 9, 18, 21, 22
+"""First columns of the parts of a triangle's record, and its length."""
+
+_OFFSET_SCALE = 2.0**-18
 
 
 @dataclass(frozen=True)
 class Lights:
     """Emissive triangles and the constant sky, chosen in proportion to their power.
 
-    ``triangles`` (L,) int32 and ``areas`` (L,) float32; ``threshold``, ``alias``, ``pdf`` the alias table over the L
-    triangles, plus one last entry for the sky where there is one. ``sky`` (3,) float32.
+    ``triangles`` (L,) int32; ``threshold``, ``alias``, ``pdf`` the alias table over the L triangles, plus one last entry
+    for the sky where there is one. ``density`` (L,) float32: pdf per area of a point on the triangle. ``sky`` (3,)
+    float32.
     """
 
     triangles: I32
-    areas: F32
+    density: F32
     threshold: F32
     alias: I32
     pdf: F32
@@ -44,12 +50,13 @@ class Lights:
 
 @dataclass
 class CompiledScene:
-    """``triangles`` (T, 18) float32: three corners, then their three unit shading normals; moving ones last.
+    """``triangles`` (T, RECORD) float32, moving ones last: three corners, their three unit shading normals, the unit
+    normal of the front face (counter-clockwise corners), and the ray offset.
 
-    ``triangle_info`` (T, 3) int32: material, object, light index or -1. ``triangle_uvs`` (T, 6) float32 and
+    ``triangle_info`` (T, 4) int32: material, object, light index or -1, 1 if the shading normals are the vertices'. ``triangle_uvs`` (T, 6) float32 and
     ``uv_density`` (T,) float32, uv units per scene unit (both of length 1 where nothing is textured).
     ``base_color``, ``emission`` (M, 3) float32; ``material_info`` (M, 3) int32: base texture, emission texture, double
-    sided. ``prev_triangles`` (moving, 18) float32: the moving ones one frame ago.
+    sided. ``prev_triangles`` (moving, RECORD) float32: the moving ones one frame ago.
     ``static_count``: number of triangles that never move.
     """
 
@@ -84,33 +91,40 @@ class CompiledScene:
         self.prev_triangles[:] = self._moving_at(previous_time)
 
     def _moving_at(self, time: float) -> F32:
-        parts = [_corners(mesh, self.origin, time) for mesh in self.scene.meshes if mesh.motion is not None]
+        parts = [_records(mesh, self.origin, time) for mesh in self.scene.meshes if mesh.motion is not None]
         return np.concatenate(parts)
 
-    def moving_box(self) -> tuple[F32, F32]:
-        """Bounds of the moving triangles as they are now, each (3,) float32, widened against rounding."""
+    def moving_box(self) -> F32:
+        """Bounds of the moving triangles as they are now, (2, 3) float32, widened against rounding."""
         corners = self.triangles[self.static_count :, :9].reshape(-1, 3)
         margin = np.float32(1e-5 * self.extent)
-        return corners.min(0) - margin, corners.max(0) + margin
+        return np.stack([corners.min(0) - margin, corners.max(0) + margin])
 
     def camera_at(self, time: float, moving: bool) -> Camera:
         """The flight's camera at ``time`` seconds, or the still one."""
         return self.scene.flight(time) if moving and self.scene.flight is not None else self.scene.camera
 
 
-def _corners(mesh: Mesh, origin: F64, time: float = 0.0) -> F32:
-    """(F, 18) float32 records of one mesh: corners relative to ``origin``, then unit shading normals."""
+def _records(mesh: Mesh, origin: F64, time: float = 0.0) -> F32:
+    """(F, RECORD) float32 triangle records of one mesh, relative to ``origin``.
+
+    The ray offset is the distance by which rays leave the surface, along the normal: Embree starts at t = 0 and would
+    hit it again. The errors of an interpolated point and of the intersection grow with the coordinates (PBR book, 4th
+    ed., sec. 6.8), so it is 64 units in the last place of the triangle's largest one: 23 µm in a room of 6 m.
+    """
     matrix = np.eye(4) if mesh.motion is None else np.asarray(mesh.motion(time), dtype=np.float64)
     vertices = mesh.vertices if mesh.motion is None else mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3]
     corners = (vertices - origin)[mesh.faces]
+    face = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.linalg.norm(face, axis=1, keepdims=True)
+    face = face / np.where(length > 0.0, length, 1.0)
     if mesh.normals is None:
-        face = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        length = np.linalg.norm(face, axis=1, keepdims=True)
-        face = face / np.where(length > 0.0, length, 1.0)
         normals = np.repeat(face[:, None], 3, axis=1)
     else:
         normals = mesh.normals[mesh.faces].astype(np.float64) @ matrix[:3, :3].T
-    return np.concatenate([corners.reshape(-1, 9), normals.reshape(-1, 9)], axis=1).astype(np.float32)
+    flat = corners.reshape(-1, 9)
+    offset = np.abs(flat).max(1, keepdims=True) * _OFFSET_SCALE
+    return np.concatenate([flat, normals.reshape(-1, 9), face, offset], axis=1).astype(np.float32)
 
 
 def _uv_density(uvs: F64, triangles: F32) -> F32:
@@ -129,8 +143,9 @@ def compile_scene(scene: Scene) -> CompiledScene:
     meshes = [m for m in scene.meshes if m.motion is None] + [m for m in scene.meshes if m.motion is not None]
     static_count = sum(len(m.faces) for m in meshes if m.motion is None)
     origin = scene.origin
-    triangles = np.concatenate([_corners(mesh, origin) for mesh in meshes])
-    info = np.full((len(triangles), 3), -1, dtype=np.int32)
+    triangles = np.concatenate([_records(mesh, origin) for mesh in meshes])
+    info = np.full((len(triangles), 4), -1, dtype=np.int32)
+    info[:, SMOOTH] = np.repeat([m.normals is not None for m in meshes], [len(m.faces) for m in meshes])
     info[:, MATERIAL] = np.concatenate([m.materials for m in meshes])
     info[:, OBJECT] = np.repeat(np.arange(len(meshes)), [len(m.faces) for m in meshes])
 
@@ -199,7 +214,7 @@ def _collect_lights(compiled: CompiledScene) -> Lights:
     threshold, alias, pdf = build_alias(power) if len(power) else (np.zeros(0, np.float32),) * 3
     return Lights(
         triangles,
-        areas.astype(np.float32),
+        (pdf[: len(triangles)] / np.maximum(areas, 1e-30)).astype(np.float32),
         threshold,
         np.asarray(alias, np.int32),
         pdf,

@@ -167,7 +167,7 @@ def _material(item: Wanted) -> int | None:
 def _parts(
     file: GltfFile, wanted: list[Wanted], table: MaterialTable, repairs: Repairs, notices: Notices
 ) -> dict[int, list[Part]]:
-    """Repaired triangles by mesh, in the mesh's own space, with the scene's material numbers and texture coordinates."""
+    """Repaired triangles by mesh, in its own space, with the scene's material numbers and texture coordinates."""
     mappings = {item.key: table.mappings.get(_material(item)) for item in wanted}
     asked = [replace(item, uv_set=None if (m := mappings[item.key]) is None else m.uv_set) for item in wanted]
     raw = read_parts(file, asked)
@@ -198,7 +198,7 @@ def _parts(
 
 
 def _camera(file: GltfFile, nodes: list[_Node], notices: Notices) -> Camera | None:
-    """The first perspective camera that the scene reaches. Its vertical field of view is kept for every aspect ratio."""
+    """The first perspective camera that the scene reaches; its vertical field of view holds for any aspect ratio."""
     with_camera = [node for node in nodes if "camera" in node.entry]
     for node in with_camera:
         entry = file.entry("cameras", node.entry["camera"], f"node {node.name!r}")

@@ -29,8 +29,8 @@ _REQUIRED_AND_KNOWN = {
 _APPROXIMATED = "KHR_materials_"  # every extension of materials: what it adds is named and left out
 
 _DECOMPRESS = (
-    "write it again without compression: `npx @gltf-transform/cli copy in.glb out.glb` (gltfpack: leave out -c and -cc; "
-    "Blender: export with Compression off)"
+    "write it again without compression: `npx @gltf-transform/cli copy in.glb out.glb` does it "
+    "(gltfpack: leave out -c and -cc; Blender: export with Compression off)"
 )
 
 

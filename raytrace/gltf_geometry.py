@@ -28,7 +28,7 @@ _NORMALS, _UVS = "_NORMAL", "_UV"  # trimesh keeps attributes with a leading und
 
 @dataclass(frozen=True)
 class Wanted:
-    """A primitive to read: ``json[meshes][mesh][primitives][index]``, with texture coordinate set ``uv_set`` or None."""
+    """A primitive to read: number ``index`` of mesh ``mesh``, with texture coordinate set ``uv_set`` or none."""
 
     mesh: int
     index: int

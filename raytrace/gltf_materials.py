@@ -17,7 +17,7 @@ from raytrace.resources import read_uri
 from raytrace.scene import Material, Texture
 
 GREY = Material("no material", double_sided=True)
-"""For triangles without a material. glTF's own default, a white metal, would keep light for ever as a diffuse surface."""
+"""For triangles without a material: glTF's own default, a white metal, would as a diffuse surface absorb nothing."""
 
 _DRAWN = "drawn as diffuse with their base colour"
 _TEXTURE_SOURCES = ("EXT_texture_webp",)  # extensions of a texture that name an image Pillow can decode
@@ -186,7 +186,7 @@ class _Reader:
             "material{s} with an occlusion map: left out, the tracer finds occlusion itself": "occlusionTexture"
             in entry,
             "cut-out or blended material{s} (alphaMode): drawn opaque": entry.get("alphaMode", "OPAQUE") != "OPAQUE",
-            "material{s} that let light through (transmission): drawn opaque": passes,
+            "see-through material{s} (transmission): drawn opaque": passes,
             "unlit material{s}: lit like all others": unlit,
         }
         facts |= {f"material{{s}} with {name}: drawn without it": True for name in others}

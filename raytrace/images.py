@@ -27,7 +27,7 @@ def decode_image(data: bytes, name: str, used_by: str, notices: Notices) -> Text
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error", Image.DecompressionBombWarning)
-            image = Image.open(io.BytesIO(data), formats=_FORMATS)
+            image: Image.Image = Image.open(io.BytesIO(data), formats=_FORMATS)
             image.load()
             if image.mode != "F":
                 image = _to_rgb(image)

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from raytrace import kernels
 from raytrace.camera import Camera
 from raytrace.compiled import OBJECT, CompiledScene
-from raytrace.embree import RayCaster
+from raytrace.embree import open_caster
 from raytrace.frame import FramePacket
 from raytrace.kernels import SHADOW_END, Outputs, Variant
 from raytrace.sampling import HALTON, HASH
@@ -102,13 +102,14 @@ class _Scratch(threading.local):
 @dataclass
 class Settings:
     """How frames are traced. ``generator``: HALTON or HASH; ``threads`` 0 = one per core; ``tile`` pixels per tile;
-    ``positions``: frames carry world positions."""
+    ``positions``: frames carry world positions; ``backend``: see :func:`raytrace.embree.open_caster`."""
 
     seed: int = 0
     generator: int = HALTON
     threads: int = 0
     tile: int = 16384
     positions: bool = False
+    backend: str = "auto"
 
 
 class Tracer:
@@ -118,7 +119,7 @@ class Tracer:
         self.scene = scene
         self.settings = settings or Settings()
         self.variant: Variant = kernels.variant_of(scene)
-        self.rays = RayCaster(scene.triangles, scene.static_count)
+        self.rays = open_caster(scene.triangles, scene.static_count, self.settings.backend)
         self.tables = kernels.tables_of(scene)
         self._guides = kernels.guide_kernel(self.variant, self.settings.positions)
         self._first_hit = kernels.first_hit_kernel(self.variant)
@@ -137,6 +138,7 @@ class Tracer:
     def close(self) -> None:
         if self._pool is not None:
             self._pool.shutdown()
+        self.rays.close()
 
     def warm_up(self) -> None:
         """Compile, or load from the disk cache, every kernel that frames of this scene need."""
@@ -154,10 +156,12 @@ class Tracer:
 
     def primary(self, view: View, pixels: I32) -> Hits:
         """Surface points seen through ``pixels`` (n,) int32 = y·width + x, row 0 at the bottom."""
-        hits, _ = self._camera_hits(view, pixels)
+        hits, _ = self._camera_hits(view, pixels, whole_rows=False)
         return hits
 
-    def _camera_hits(self, view: View, pixels: I32) -> tuple[Hits, F32]:
+    def _camera_hits(self, view: View, pixels: I32, whole_rows: bool) -> tuple[Hits, F32]:
+        """Hits, and the ray directions (in scratch memory). ``whole_rows``: four image rows or a multiple, from a
+        multiple of four on, as tiles are: those are traced as packets."""
         count = len(pixels)
         scratch = self._scratch
         scratch.reserve(count)
@@ -165,7 +169,10 @@ class Tracer:
         kernels.camera_rays(
             pixels, *view.size, view.eye, view.right, view.up, view.forward, view.jitter, origins, directions
         )
-        triangle, u, v = self.rays.intersect(origins, directions)
+        if whole_rows:
+            triangle, u, v = self.rays.intersect_rows(origins, directions, view.size[0])
+        else:
+            triangle, u, v = self.rays.intersect(origins, directions)
         # Index -1 of a miss picks some object; it is overwritten where that matters.
         objects = np.where(triangle >= 0, self.scene.triangle_info[triangle, OBJECT], np.int32(-1))
         return Hits(triangle, u, v, objects), directions
@@ -231,13 +238,13 @@ class Tracer:
         outputs = self._outputs(count)
 
         def tile(pixels: I32) -> None:
-            hits, directions = self._camera_hits(view, pixels)
+            hits, directions = self._camera_hits(view, pixels, whole_rows=True)
             self._write_guides(view, before, pixels, hits, directions, outputs)
             seeds = Seeds(pixels.astype(np.uint32), np.full(len(pixels), index, np.uint32))
             part = slice(int(pixels[0]), int(pixels[-1]) + 1)
             self.shade(hits, seeds, view.eye, direct[part], indirect[part])
 
-        embree = self.for_each_tile(tile, count)
+        embree = self.for_each_tile(tile, size)
         timings = {"trace": time.perf_counter() - start, "embree": embree}
         return self._packet(index, now, size, direct, indirect, outputs, cut, camera, timings)
 
@@ -264,7 +271,7 @@ class Tracer:
         done = [0]
 
         def tile(pixels: I32) -> None:
-            hits, _ = self._camera_hits(view, pixels)
+            hits, _ = self._camera_hits(view, pixels, whole_rows=True)
             part = slice(int(pixels[0]), int(pixels[-1]) + 1)
             direct, indirect = np.empty((2, len(pixels), 3), np.float32)
             seeds = Seeds(pixels.astype(np.uint32), np.empty(len(pixels), np.uint32))
@@ -278,15 +285,20 @@ class Tracer:
                 progress(done[0] / count)
 
         try:
-            self.for_each_tile(tile, count)
+            self.for_each_tile(tile, size)
         finally:
             self.settings = normal
         means = (sums / samples).reshape(2, size[1], size[0], 3)
         return means[0], means[1]
 
-    def for_each_tile(self, work: Callable[[I32], None], count: int) -> float:
-        """Run ``work`` on tiles of consecutive pixels; returns seconds inside Embree, averaged over the threads."""
-        step = self.settings.tile
+    def for_each_tile(self, work: Callable[[I32], None], size: tuple[int, int]) -> float:
+        """Run ``work`` on tiles of consecutive pixels; returns seconds inside Embree, averaged over the threads.
+
+        Tiles are whole rows, four or a multiple, so that packets of 4x4 pixels are the same for every tile size.
+        """
+        width, height = size
+        count = width * height
+        step = width * 4 * max(1, self.settings.tile // (width * 4))
         tiles = [np.arange(i, min(i + step, count), dtype=np.int32) for i in range(0, count, step)]
 
         def timed(pixels: I32) -> float:

@@ -20,9 +20,10 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit, uint32
+from numba import uint32
 
-from raytrace.compiled import LIGHT, MATERIAL, OBJECT, CompiledScene
+from raytrace.compiled import FACE_NORMAL, LIGHT, MATERIAL, NORMALS, OBJECT, OFFSET, SMOOTH, CompiledScene
+from raytrace.compilation import device, kernel
 from raytrace.sampling import (
     PAIR_BOUNCE,
     PAIR_LIGHT,
@@ -39,7 +40,6 @@ from raytrace.textures import SRGB_TO_LINEAR, level_for, lookup
 _ZERO, _ONE, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
 _INV_PI = np.float32(1.0 / math.pi)
 _SHADOW_END = np.float32(1.0 - 1e-6)  # of the way to the light, whose own point is already offset
-_OFFSET_ULPS = np.float32(2.0**-18)  # ray offset relative to the largest coordinate, see _surface_point
 _BOUNCE_CONE = np.float32(0.1)  # footprint of a bounce ray's hit per unit of distance: it stands for a wide lobe
 _MIN_COSINE = np.float32(0.05)  # grazing limit of the depth gradient and of texture footprints
 
@@ -58,10 +58,10 @@ class Tables(NamedTuple):
     levels: Any
     decode: Any
     light_triangles: Any
-    light_areas: Any
     light_threshold: Any
     light_alias: Any
     light_pdf: Any
+    light_density: Any
     sky: Any
     prev_triangles: Any
     static_count: int
@@ -89,10 +89,10 @@ def tables_of(scene: CompiledScene) -> Tables:
         scene.textures.levels,
         SRGB_TO_LINEAR,
         lights.triangles,
-        lights.areas,
         lights.threshold,
         lights.alias,
         lights.pdf,
+        lights.density,
         lights.sky,
         scene.prev_triangles,
         scene.static_count,
@@ -103,7 +103,7 @@ def variant_of(scene: CompiledScene) -> Variant:
     return Variant(scene.has_textures, scene.lights.has_sky, scene.has_motion)
 
 
-@njit(error_model="numpy")
+@device
 def _interpolate(record, first, u, v):  # type: ignore[no-untyped-def]
     """Corner attributes at columns first .. first + 8 of one triangle record, at barycentrics u, v."""
     w = _ONE - u - v
@@ -114,49 +114,21 @@ def _interpolate(record, first, u, v):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(error_model="numpy")
-def _normalise(x, y, z):  # type: ignore[no-untyped-def]
-    length = math.sqrt(x * x + y * y + z * z)
-    scale = _ONE / length if length > _ZERO else _ZERO
+@device
+def _shading_normal(record, smooth, u, v):  # type: ignore[no-untyped-def]
+    """Unit shading normal; the face normal on flat triangles and where the vertex normals cancel."""
+    gx, gy, gz = record[FACE_NORMAL], record[FACE_NORMAL + 1], record[FACE_NORMAL + 2]
+    if smooth == 0:
+        return gx, gy, gz
+    x, y, z = _interpolate(record, NORMALS, u, v)
+    square = x * x + y * y + z * z
+    if square <= _ZERO:
+        return gx, gy, gz
+    scale = _ONE / math.sqrt(square)
     return x * scale, y * scale, z * scale
 
 
-@njit(error_model="numpy")
-def _face_normal(record):  # type: ignore[no-untyped-def]
-    """Unit geometric normal of the triangle's front side (counter-clockwise corners)."""
-    ax, ay, az = record[3] - record[0], record[4] - record[1], record[5] - record[2]
-    bx, by, bz = record[6] - record[0], record[7] - record[1], record[8] - record[2]
-    # Edges of a small triangle may have squares below single precision's range: scale them first.
-    size = max(max(abs(ax), max(abs(ay), abs(az))), max(abs(bx), max(abs(by), abs(bz))))
-    scale = _ONE / size if size > _ZERO else _ZERO
-    ax, ay, az, bx, by, bz = ax * scale, ay * scale, az * scale, bx * scale, by * scale, bz * scale
-    return _normalise(ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx)
-
-
-@njit(error_model="numpy")
-def _shading_normal(record, u, v, gx, gy, gz):  # type: ignore[no-untyped-def]
-    """Unit interpolated normal; the face normal where the vertex normals cancel."""
-    x, y, z = _interpolate(record, 9, u, v)
-    nx, ny, nz = _normalise(x, y, z)
-    if nx == _ZERO and ny == _ZERO and nz == _ZERO:
-        return gx, gy, gz
-    return nx, ny, nz
-
-
-@njit(error_model="numpy")
-def _ray_offset(record):  # type: ignore[no-untyped-def]
-    """Distance by which rays leave the surface, along the normal: Embree starts at t = 0 and would hit it again.
-
-    The errors of the interpolated point and of the intersection grow with the coordinates of the corners (PBR book,
-    4th ed., sec. 6.8), so the offset does: 64 units in the last place of the largest one. It is 23 µm in a room of 6 m.
-    """
-    size = _ZERO
-    for i in range(9):
-        size = max(size, abs(record[i]))
-    return size * _OFFSET_ULPS
-
-
-@njit(error_model="numpy")
+@device
 def _surface_color(textured, tables, column, factor, triangle, material, u, v, footprint):  # type: ignore[no-untyped-def]
     """Factor times texture (column 0: base colour, 1: emission) for a footprint in scene units."""
     r, g, b = factor[material, 0], factor[material, 1], factor[material, 2]
@@ -174,7 +146,7 @@ def _surface_color(textured, tables, column, factor, triangle, material, u, v, f
     return r, g, b
 
 
-@njit(error_model="numpy")
+@device
 def _light_sample(textured, has_sky, tables, px, py, pz, nx, ny, nz, gx, gy, gz, offset, u, v, choice, mis):  # type: ignore[no-untyped-def]
     """One light sample at p: shadow ray direction (its length is the segment) and radiance·cos/(π·pdf).
 
@@ -194,7 +166,7 @@ def _light_sample(textured, has_sky, tables, px, py, pz, nx, ny, nz, gx, gy, gz,
     record = tables.triangles[triangle]
     b, c = sample_triangle(u, v)
     qx, qy, qz = _interpolate(record, 0, b, c)
-    lx, ly, lz = _face_normal(record)
+    lx, ly, lz = record[FACE_NORMAL], record[FACE_NORMAL + 1], record[FACE_NORMAL + 2]
     material = tables.info[triangle, MATERIAL]
     dx, dy, dz = qx - px, qy - py, qz - pz
     facing = -(dx * lx + dy * ly + dz * lz)
@@ -205,16 +177,14 @@ def _light_sample(textured, has_sky, tables, px, py, pz, nx, ny, nz, gx, gy, gz,
     cosine = dx * nx + dy * ny + dz * nz
     if cosine <= _ZERO or facing <= _ZERO or dx * gx + dy * gy + dz * gz <= _ZERO:
         return _ZERO, _ZERO, _ZERO, _ZERO, _ZERO, _ZERO
+    # With both cosines times the distance, and the density per area of this point, select / area: the density per solid
+    # angle is density·distance²/cos at the light, and that of a bounce ray cos/π. One division serves it all.
     square = dx * dx + dy * dy + dz * dz
-    distance = math.sqrt(square)
-    inverse = _ONE / distance
-    cosine, facing = cosine * inverse, facing * inverse
-    # Density per solid angle: select / area · distance² / cos at the light.
-    pdf = select / tables.light_areas[light] * square / facing
-    bounce = cosine * _INV_PI
-    scale = bounce / (pdf + bounce) if mis else bounce / pdf
+    bounce = cosine * facing * _INV_PI / square
+    density = tables.light_density[light] * square
+    scale = bounce / (density + bounce) if mis else bounce / density
     r, g, bl = _surface_color(textured, tables, 1, tables.emission, triangle, material, b, c, _ZERO)
-    margin = _ray_offset(record)
+    margin = record[OFFSET]
     # Ends short of the light by the light's own offset, starts off the surface (added by the caller).
     return (
         dx + lx * margin - gx * offset,
@@ -226,7 +196,7 @@ def _light_sample(textured, has_sky, tables, px, py, pz, nx, ny, nz, gx, gy, gz,
     )
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@kernel
 def camera_rays(pixels, width, height, eye, right, up, forward, jitter, origins, directions):  # type: ignore[no-untyped-def]
     """Rays through ``pixels`` (n,) int32 = y·width + x, row 0 at the bottom.
 
@@ -243,7 +213,7 @@ def camera_rays(pixels, width, height, eye, right, up, forward, jitter, origins,
             directions[i, k] = forward[k] + sx * right[k] + sy * up[k]
 
 
-@njit(error_model="numpy")
+@device
 def _project(matrix, x, y, z):  # type: ignore[no-untyped-def]
     """Clip-space x, y and w of a point."""
     return (
@@ -272,7 +242,7 @@ def guide_kernel(variant: Variant, positions: bool) -> Callable[..., Any]:
     textured = variant.textured
     has_sky, moving = variant.sky, variant.moving
 
-    @njit(nogil=True, cache=True, error_model="numpy")
+    @kernel
     def guides(  # type: ignore[no-untyped-def]
         tables, pixels, directions, triangle, u, v, eye, right, up, forward, matrix, prev_matrix, size, out
     ):
@@ -311,8 +281,8 @@ def guide_kernel(variant: Variant, positions: bool) -> Callable[..., Any]:
                 continue
             record = tables.triangles[t]
             x, y, z = _interpolate(record, 0, u[i], v[i])
-            gx, gy, gz = _face_normal(record)
-            nx, ny, nz = _shading_normal(record, u[i], v[i], gx, gy, gz)
+            gx, gy, gz = record[FACE_NORMAL], record[FACE_NORMAL + 1], record[FACE_NORMAL + 2]
+            nx, ny, nz = _shading_normal(record, tables.info[t, SMOOTH], u[i], v[i])
             dx, dy, dz = directions[i, 0], directions[i, 1], directions[i, 2]
             front = gx * dx + gy * dy + gz * dz <= _ZERO
             if not front:
@@ -352,8 +322,7 @@ def guide_kernel(variant: Variant, positions: bool) -> Callable[..., Any]:
                 if t >= tables.static_count:
                     before = tables.prev_triangles[t - tables.static_count]
                     px, py, pz = _interpolate(before, 0, u[i], v[i])
-                    hx, hy, hz = _face_normal(before)
-                    qx, qy, qz = _shading_normal(before, u[i], v[i], hx, hy, hz)
+                    qx, qy, qz = _shading_normal(before, tables.info[t, SMOOTH], u[i], v[i])
                     if not front:
                         qx, qy, qz = -qx, -qy, -qz
                 out.prev_normal[p, 0] = qx
@@ -389,7 +358,7 @@ def first_hit_kernel(variant: Variant) -> Callable[..., Any]:
     """Kernel that shades first hits: returns how many shadow and bounce rays it wrote."""
     textured, has_sky = variant.textured, variant.sky
 
-    @njit(nogil=True, cache=True, error_model="numpy")
+    @kernel
     def first_hit(  # type: ignore[no-untyped-def]
         tables, triangle, u, v, eye, pixel_seeds, frame_seeds, seed, generator,
         shadow_o, shadow_d, shadow_index, shadow_light, bounce_o, bounce_d, bounce_index, bounce_pdf,
@@ -402,11 +371,11 @@ def first_hit_kernel(variant: Variant) -> Callable[..., Any]:
                 continue
             record = tables.triangles[t]
             x, y, z = _interpolate(record, 0, u[i], v[i])
-            gx, gy, gz = _face_normal(record)
-            nx, ny, nz = _shading_normal(record, u[i], v[i], gx, gy, gz)
+            gx, gy, gz = record[FACE_NORMAL], record[FACE_NORMAL + 1], record[FACE_NORMAL + 2]
+            nx, ny, nz = _shading_normal(record, tables.info[t, SMOOTH], u[i], v[i])
             if gx * (eye[0] - x) + gy * (eye[1] - y) + gz * (eye[2] - z) < _ZERO:
                 gx, gy, gz, nx, ny, nz = -gx, -gy, -gz, -nx, -ny, -nz
-            offset = _ray_offset(record)
+            offset = record[OFFSET]
             ox, oy, oz = x + gx * offset, y + gy * offset, z + gz * offset
             key = path_key(seed, pixel_seeds[i])
             frame = uint32(frame_seeds[i])
@@ -440,7 +409,7 @@ def second_hit_kernel(variant: Variant) -> Callable[..., Any]:
     """Kernel that shades bounce hits: adds light found by the ray to ``direct``, writes shadow rays; returns how many."""
     textured, has_sky = variant.textured, variant.sky
 
-    @njit(nogil=True, cache=True, error_model="numpy")
+    @kernel
     def second_hit(  # type: ignore[no-untyped-def]
         tables, triangle, u, v, bounce_o, bounce_d, bounce_index, bounce_pdf, pixel_seeds, frame_seeds, seed, generator,
         direct, shadow_o, shadow_d, shadow_index, shadow_light,
@@ -458,8 +427,8 @@ def second_hit_kernel(variant: Variant) -> Callable[..., Any]:
                 continue
             record = tables.triangles[t]
             x, y, z = _interpolate(record, 0, u[k], v[k])
-            gx, gy, gz = _face_normal(record)
-            nx, ny, nz = _shading_normal(record, u[k], v[k], gx, gy, gz)
+            gx, gy, gz = record[FACE_NORMAL], record[FACE_NORMAL + 1], record[FACE_NORMAL + 2]
+            nx, ny, nz = _shading_normal(record, tables.info[t, SMOOTH], u[k], v[k])
             dx, dy, dz = bounce_d[k, 0], bounce_d[k, 1], bounce_d[k, 2]
             front = gx * dx + gy * dy + gz * dz <= _ZERO
             if not front:
@@ -470,7 +439,7 @@ def second_hit_kernel(variant: Variant) -> Callable[..., Any]:
             material = tables.info[t, MATERIAL]
             light = tables.info[t, LIGHT]
             if light >= 0 and (front or tables.material_info[material, 2] != 0):
-                pdf = tables.light_pdf[light] / tables.light_areas[light] * square / max(facing, np.float32(1e-7))
+                pdf = tables.light_density[light] * square / max(facing, np.float32(1e-7))
                 weight = bounce_pdf[k] / (bounce_pdf[k] + pdf)
                 r, g, b = _surface_color(textured, tables, 1, tables.emission, t, material, u[k], v[k], _ZERO)
                 direct[i, 0] += r * weight
@@ -482,7 +451,7 @@ def second_hit_kernel(variant: Variant) -> Callable[..., Any]:
             frame = uint32(frame_seeds[i])
             _unused, choice = random_pair(key, frame, PAIR_SELECT, generator)
             a, b = random_pair(key, frame, PAIR_SECOND_LIGHT, generator)
-            offset = _ray_offset(record)
+            offset = record[OFFSET]
             dx, dy, dz, r, g, bl = _light_sample(
                 textured, has_sky, tables, x, y, z, nx, ny, nz, gx, gy, gz, offset, a, b, choice, False
             )
@@ -504,7 +473,7 @@ def second_hit_kernel(variant: Variant) -> Callable[..., Any]:
     return second_hit
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@kernel
 def add_unoccluded(blocked, index, light, out):  # type: ignore[no-untyped-def]
     """Add the light of each shadow ray that got through (Embree's -1) to its path."""
     for k in range(blocked.shape[0]):
@@ -515,7 +484,7 @@ def add_unoccluded(blocked, index, light, out):  # type: ignore[no-untyped-def]
             out[i, 2] += light[k, 2]
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@kernel
 def fill(values, count, value):  # type: ignore[no-untyped-def]
     for i in range(count):
         values[i] = value

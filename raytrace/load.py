@@ -96,7 +96,7 @@ def framed(scene: Scene) -> Camera:
 
 def has_lamp(scene: Scene) -> bool:
     """Whether any triangle gives light to speak of: a logo that glows through an emissive texture lights no scene."""
-    used = {int(m) for mesh in scene.meshes for m in np.unique(mesh.materials)}
+    used = {int(m) for mesh in scene.meshes for m in np.flatnonzero(np.bincount(mesh.materials))}
     for material in (scene.materials[index] for index in used):
         if material.emits:
             if material.emission_texture < 0:

@@ -74,14 +74,14 @@ def _part(text: ObjText, faces: I64, normals: NDArray[np.float64] | None, textur
 
 
 class _Materials:
-    """Scene materials in the order of ``text.material_names``; ``textured`` (M,) tells which read texture coordinates."""
+    """Scene materials in the order of ``text.material_names``; ``textured`` (M,): which read texture coordinates."""
 
     def __init__(self, path: Path, text: ObjText, notices: Notices) -> None:
         self.path, self.notices = path, notices
         self.textures: list[Texture] = []
         self._numbers: dict[Path, int] = {}
         library = self._libraries(text.libraries)
-        used = set(np.unique(text.materials).tolist())
+        used = set(np.flatnonzero(np.bincount(text.materials)).tolist())
         self.materials = [
             self._material(library.get(name), name) if number in used else Material(name)
             for number, name in enumerate(text.material_names)

@@ -1,8 +1,8 @@
 """Wavefront OBJ text as arrays.
 
-trimesh 5.2 drops lines such as ``v<TAB>x y z``, counts relative indices from the end of the file instead of the current
-line, mistakes a hexagon for three ``v/vt`` corners, and takes twice as long; none of it is reported. So the text is read
-here: lines are sorted by their keyword and each kind is converted at once.
+trimesh 5.2 drops lines such as ``v<TAB>x y z``, counts relative indices from the end of the file instead of the line
+they are in, mistakes a hexagon for three ``v/vt`` corners, and says nothing about any of it. So the text is read here:
+lines are told apart by their keyword, and all lines of a kind are converted at once.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ from __future__ import annotations
 import re
 import warnings
 from dataclasses import dataclass
-from itertools import compress
 from pathlib import Path
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ from raytrace.parts import F64, I64
 from raytrace.resources import read_bytes
 
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*([eE][-+]?\d+)?|\.\d+([eE][-+]?\d+)?|nan|inf|infinity)", re.IGNORECASE)
+_BLANKS = bytes.maketrans(b"\t\v\f", b"   ")
 _CORNER = re.compile(r"-?\d+(/-?\d*){0,2}")
 
 
@@ -30,8 +31,8 @@ class ObjText:
 
     ``corners`` (F, 3, 3) int64: per triangle and corner the index of position, texture coordinate and normal from 0,
     -1 where there is none. ``objects`` and ``materials`` (F,) int64 index ``object_names`` and ``material_names``.
-    ``libraries`` are the MTL files as written; ``lines`` counts faces with fewer than three corners, which are left out;
-    ``has_colors``: positions are followed by vertex colours.
+    ``libraries`` are the MTL files as written; ``lines`` is the number of faces with fewer than three corners, which
+    are left out; ``has_colors``: positions are followed by vertex colours.
     """
 
     positions: F64
@@ -53,29 +54,44 @@ def read_obj_text(path: Path) -> ObjText:
 
 
 class _Parser:
+    """``data`` (bytes,) uint8 is the text, tidied; line k is ``data[starts[k] : starts[k + 1]]`` with its newline."""
+
     def __init__(self, path: Path) -> None:
         self.path = path
-        text = read_bytes(path).decode("utf-8", errors="replace").replace("\r\n", "\n").replace("\r", "\n")
-        text = text.replace("\\\n", "  ").replace("\t", " ")
-        self.text_lines = text.split("\n")
-        if "\n " in text or text.startswith(" "):
-            self.text_lines = [line.lstrip() for line in self.text_lines]
-        self.kinds = np.array([line[:2] for line in self.text_lines], dtype="U2")
+        self._split(_tidied(read_bytes(path)))
+        hashes = np.searchsorted(self.starts, np.flatnonzero(self.data == ord("#")), side="right") - 1
+        if np.isin(self.first[hashes], (ord("v"), ord("f"))).any():  # comments behind numbers
+            self._split(re.sub(rb"(?m)^((?:v|vt|vn|f) [^#\n]*)#.*$", rb"\1", self.data.tobytes()))
+
+    def _split(self, text: bytes) -> None:
+        self.data = np.frombuffer(text, dtype=np.uint8)
+        self.starts = np.append(0, np.flatnonzero(self.data == ord("\n")) + 1)
+        at = self.starts[:-1]
+        last = len(self.data) - 1
+        self.first, self.second = self.data[at], self.data[np.minimum(at + 1, last)]
+        self.third = self.data[np.minimum(at + 2, last)]
+
+    def _is(self, keyword: str) -> NDArray[np.bool_]:
+        """Which lines start with ``keyword``, of one or two letters, and a space."""
+        first, second, third = (keyword + "  ").encode()[:3]
+        mask: NDArray[np.bool_] = (self.first == first) & (self.second == second)
+        return mask if len(keyword) == 1 else mask & (self.third == third)
+
+    def line(self, number: int | np.integer[Any]) -> str:
+        return self.data[self.starts[number] : self.starts[number + 1]].tobytes().decode("utf-8", "replace").rstrip()
 
     def error(self, line: int, message: str) -> UserError:
-        shown = self.text_lines[line][:60]
         return UserError(
-            f"{self.path}, line {line + 1}: {message}: {shown!r}", "export the file again, or mend the line"
+            f"{self.path}, line {line + 1}: {message}: {self.line(line)[:60]!r}",
+            "export the file again, or mend the line",
         )
 
     def parse(self) -> ObjText:
-        defined = {
-            what: self.kinds == key for what, key in (("vertex", "v "), ("texture coordinate", "vt"), ("normal", "vn"))
-        }
-        position_values, has_colors = self._floats(defined["vertex"], 3)
-        uv_values, _ = self._floats(defined["texture coordinate"], 2)
-        normal_values, _ = self._floats(defined["normal"], 3)
-        is_face = self.kinds == "f "
+        defined = {"vertex": self._is("v"), "texture coordinate": self._is("vt"), "normal": self._is("vn")}
+        positions, has_colors = self._floats(defined["vertex"], 3)
+        uvs, _ = self._floats(defined["texture coordinate"], 2)
+        normals, _ = self._floats(defined["normal"], 3)
+        is_face = self._is("f")
         face_lines = np.flatnonzero(is_face)
         flat, sizes = self._corners(is_face)
         for column, (what, lines) in enumerate(defined.items()):
@@ -86,9 +102,9 @@ class _Parser:
         objects, object_names = _in_force(directives, "g" if use_groups else "o", face_lines[faces])
         materials, material_names = _in_force(directives, "usemtl", face_lines[faces])
         return ObjText(
-            positions=position_values,
-            uvs=uv_values,
-            normals=normal_values,
+            positions=positions,
+            uvs=uvs,
+            normals=normals,
             corners=corners,
             objects=objects,
             materials=materials,
@@ -102,63 +118,81 @@ class _Parser:
     def _directives(self) -> list[tuple[int, str, str]]:
         """Line, keyword and the rest of it, for each line that names something."""
         result = []
-        for line in np.flatnonzero(np.isin(self.kinds, ["o ", "g ", "g", "us", "mt"])):
-            keyword, _, rest = self.text_lines[line].partition(" ")
-            result.append((int(line), keyword, rest.strip()))
+        for number in np.flatnonzero(np.isin(self.first, np.frombuffer(b"ogum", dtype=np.uint8))):
+            keyword, _, rest = self.line(number).partition(" ")
+            if keyword in ("o", "g", "usemtl", "mtllib"):
+                result.append((int(number), keyword, rest.strip()))
         return result
 
-    def _data(self, mask: NDArray[np.bool_]) -> list[str]:
-        """The chosen lines without keyword and comment."""
-        lines = [line[2:] for line in compress(self.text_lines, mask)]
-        return [line.partition("#")[0] for line in lines] if any("#" in line for line in lines) else lines
+    def _block(self, mask: NDArray[np.bool_]) -> tuple[NDArray[np.uint8], I64, I64]:
+        """The chosen lines in a row with blanks for keywords: bytes, first byte and number of words of each line."""
+        lengths = np.diff(self.starts)
+        block = self.data[np.repeat(mask, lengths)]
+        starts = np.cumsum(lengths[mask]) - lengths[mask]
+        block[starts] = block[starts + 1] = ord(" ")
+        return block, starts, _per_line(_word_starts(block), starts)
 
     def _floats(self, mask: NDArray[np.bool_], width: int) -> tuple[F64, bool]:
-        """First ``width`` numbers of each chosen line, missing ones 0, (n, width); whether they look followed by colours."""
-        lines = self._data(mask)
-        if not lines:
+        """First ``width`` numbers of each chosen line, (n, width), and whether any are followed by a colour.
+
+        A texture coordinate may be one number only: the second one is 0.
+        """
+        if not mask.any():
             return np.zeros((0, width)), False
-        counts = np.array([len(line.split()) for line in lines])
-        least = int(counts.min())
-        if least != counts.max() or least < width:
-            if least < (1 if width == 2 else width):
-                short = np.flatnonzero(mask)[counts.argmin()]
-                raise self.error(int(short), f"{width} numbers are needed")
-            lines = [" ".join((line.split() + ["0"])[:width]) for line in lines]
-        values = _converted(" ".join(lines), np.float64)
-        if values is None or values.size % len(lines):
+        block, _, counts = self._block(mask)
+        if counts.min() != counts.max() or counts[0] < width:
+            return self._ragged_floats(mask, width)
+        values = _converted(block, np.float64)
+        if values is None or len(values) != counts.sum():
             raise self._bad_line(mask, _NUMBER)
-        return np.ascontiguousarray(values.reshape(len(lines), -1)[:, :width]), bool(counts.max() >= 6)
+        return np.ascontiguousarray(values.reshape(len(counts), -1)[:, :width]), bool(counts[0] >= 6)
+
+    def _ragged_floats(self, mask: NDArray[np.bool_], width: int) -> tuple[F64, bool]:
+        """The same, line by line, for lines of different length."""
+        rows = []
+        longest = 0
+        for number in np.flatnonzero(mask):
+            words = self.line(number).split()[1:]
+            longest = max(longest, len(words))
+            if len(words) < (1 if width == 2 else width):
+                raise self.error(int(number), f"{width} numbers are needed")
+            if not all(_NUMBER.fullmatch(word) for word in words):
+                raise self.error(int(number), "cannot be understood")
+            rows.append([float(word) for word in [*words, "0"][:width]])
+        return np.array(rows), longest >= 6
 
     def _bad_line(self, mask: NDArray[np.bool_], word: re.Pattern[str]) -> UserError:
-        for line in np.flatnonzero(mask):
-            if not all(word.fullmatch(part) for part in self.text_lines[line].split()[1:]):
-                return self.error(int(line), "cannot be understood")
-        return UserError(f"{self.path}: cannot be understood", "export the file again")
+        for number in np.flatnonzero(mask):
+            if not all(word.fullmatch(part) for part in self.line(number).split()[1:]):
+                return self.error(int(number), "cannot be understood")
+        return UserError(f"{self.path}: its numbers cannot be understood", "export the file again")
 
     def _corners(self, mask: NDArray[np.bool_]) -> tuple[I64, I64]:
-        """Indices as written, (n, 3), 0 where absent, and the number of corners of each face."""
-        lines = self._data(mask)
-        if any("/ " in line or line.endswith("/") for line in lines):  # "1/" and "1//" mean "1"
-            lines = [re.sub(r"/+(?= |$)", "", line) for line in lines]
-        sizes = np.array([len(line.split()) for line in lines], dtype=np.int64)
-        slashes = np.array([line.count("/") for line in lines], dtype=np.int64)
-        double = np.array(["//" in line for line in lines], dtype=bool)
+        """Indices as written, (n, 3), 0 where absent, and the number of corners of each face, (F,)."""
+        if not mask.any():
+            return np.zeros((0, 3), dtype=np.int64), np.zeros(0, dtype=np.int64)
+        block, starts, sizes = self._block(mask)
+        slash = block == ord("/")
+        slashes = _per_line(slash, starts)
+        double = _per_line(slash & np.append(slash[1:], False), starts) > 0
+        block[slash] = ord(" ")
         flat = np.zeros((int(sizes.sum()), 3), dtype=np.int64)
-        known = np.zeros(len(lines), dtype=bool)
+        known = np.zeros(len(sizes), dtype=bool)
+        lengths = np.diff(np.append(starts, len(block)))
         forms = (
-            ([0], ~double & (slashes == 0)),
-            ([0, 1], ~double & (slashes == sizes) & (sizes > 0)),
-            ([0, 2], double & (slashes == 2 * sizes)),
-            ([0, 1, 2], ~double & (slashes == 2 * sizes) & (sizes > 0)),
+            (slice(0, 1), slashes == 0),
+            (slice(0, 2), ~double & (slashes == sizes) & (sizes > 0)),
+            (slice(0, 3, 2), double & (slashes == 2 * sizes)),
+            (slice(0, 3), ~double & (slashes == 2 * sizes) & (sizes > 0)),
         )
         for columns, form in forms:
             if not form.any():
                 continue
-            chosen = lines if form.all() else list(compress(lines, form))
-            values = _converted(" ".join(chosen).replace("/", " "), np.int64)
-            if values is None or values.size != sizes[form].sum() * len(columns):
+            values = _converted(block if form.all() else block[np.repeat(form, lengths)], np.int64)
+            width = len(range(3)[columns])
+            if values is None or len(values) != sizes[form].sum() * width:
                 raise self._bad_line(mask, _CORNER)
-            flat[np.ix_(np.repeat(form, sizes), columns)] = values.reshape(-1, len(columns))
+            flat[np.repeat(form, sizes), columns] = values.reshape(-1, width)
             known |= form
         if not known.all():
             raise self.error(int(np.flatnonzero(mask)[known.argmin()]), "its corners are not written alike")
@@ -182,12 +216,43 @@ class _Parser:
         return np.where(absent, -1, absolute)
 
 
-def _converted(text: str, dtype: type[np.float64] | type[np.int64]) -> NDArray[np.float64] | NDArray[np.int64] | None:
+def _tidied(text: bytes) -> bytes:
+    """One blank for each tab, one newline for each kind of line end, continued lines joined, no blanks in front."""
+    text = text.removeprefix(b"\xef\xbb\xbf")
+    if b"\r" in text:
+        text = text.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    text = text.translate(_BLANKS)
+    if b"\\\n" in text:
+        text = text.replace(b"\\\n", b" ")
+    if b"\n " in text or text.startswith(b" "):
+        text = re.sub(rb"(?m)^ +", b"", text)
+    if b"/ " in text or b"/\n" in text:
+        text = re.sub(rb"(?m)(?<=[0-9])/+(?= |$)", b"", text)  # "1/" and "1//" mean "1"
+    return text + b"\n"
+
+
+def _word_starts(text: NDArray[np.uint8]) -> NDArray[np.bool_]:
+    inside = text > ord(" ")
+    inside[1:] &= ~inside[:-1].copy()
+    return inside
+
+
+def _per_line(flags: NDArray[np.bool_], starts: I64) -> I64:
+    """How many ``flags`` are set from each start to the next."""
+    positions = np.flatnonzero(flags)
+    return np.diff(np.append(np.searchsorted(positions, starts), len(positions)))
+
+
+@overload
+def _converted(text: NDArray[np.uint8], dtype: type[np.float64]) -> F64 | None: ...
+@overload
+def _converted(text: NDArray[np.uint8], dtype: type[np.int64]) -> I64 | None: ...
+def _converted(text: NDArray[np.uint8], dtype: Any) -> Any:
     """All numbers of ``text``; None where something in it is no number."""
     with warnings.catch_warnings():
         warnings.simplefilter("error", DeprecationWarning)  # how fromstring says that it stopped halfway
         try:
-            return np.fromstring(text, sep=" ", dtype=dtype)
+            return np.fromstring(text.tobytes(), sep=" ", dtype=dtype)
         except (DeprecationWarning, ValueError):
             return None
 

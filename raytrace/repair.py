@@ -5,9 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from errors import Notices, UserError
-from raytrace.parts import F64, I64, Part, compacted, face_normals, normalized
+from raytrace.parts import F64, I64, Part, compacted, face_normals, lengths, longest_component, normalized
+
+Mask = NDArray[np.bool_]
 
 MAX_COORDINATE = 1e12
 """Largest coordinate in scene units: beyond it, squares of products leave float32."""
@@ -63,7 +66,8 @@ def repaired(part: Part, where: str, repairs: Repairs) -> Part:
         repairs.degenerate += int(flat.sum())
         part = compacted(replace(part, faces=part.faces[~flat], materials=part.materials[~flat]))
     if part.uvs is not None:
-        bad = ~(np.abs(part.uvs) <= _MAX_UV).all(axis=1)
+        good = np.abs(part.uvs) <= _MAX_UV
+        bad = ~(good[:, 0] & good[:, 1])
         repairs.texture_coordinates += int(bad.sum())
         part = replace(part, uvs=np.where(bad[:, None], 0.0, part.uvs))
     return _with_unit_normals(part, repairs)
@@ -82,47 +86,48 @@ def _check_indices(part: Part, where: str) -> None:
 
 def check_coordinates(vertices: F64, where: str) -> None:
     """Raises UserError unless all ``vertices`` (V, 3) are finite and within MAX_COORDINATE."""
-    broken = int((~np.isfinite(vertices).all(axis=1)).sum())
+    largest = longest_component(vertices)
+    broken = int((~np.isfinite(largest)).sum())
     if broken:
         raise UserError(
             f"{where}: {broken:,} of {counted(len(vertices), 'vertex', 'vertices')} {'is' if broken == 1 else 'are'} "
             "NaN or infinite",
             "repair the object in the program that made it, and export it again",
         )
-    largest = float(np.abs(vertices).max(initial=0.0))
-    if largest > MAX_COORDINATE:
+    farthest = float(largest.max(initial=0.0))
+    if farthest > MAX_COORDINATE:
         raise UserError(
-            f"{where}: a coordinate of {largest:.3g} is absurd (the limit is {MAX_COORDINATE:.0e})",
+            f"{where}: a coordinate of {farthest:.3g} is absurd (the limit is {MAX_COORDINATE:.0e})",
             "scale the object, or check its transform",
         )
 
 
-def without_area(vertices: F64, faces: I64) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+def without_area(vertices: F64, faces: I64) -> Mask:
     """Which triangles are points or lines, (F,) bool: height over longest edge at most 1e-12."""
     a, b, c = (vertices[faces[:, k]] for k in range(3))
-    edges = np.stack([b - a, c - b, a - c])
-    longest = np.abs(edges).max(axis=(0, 2), initial=0.0)
-    edges /= np.where(longest > 0.0, longest, 1.0)[:, None]  # keeps the products clear of underflow
-    height = np.linalg.norm(np.cross(edges[0], edges[1]), axis=1)
-    result: np.ndarray[tuple[int], np.dtype[np.bool_]] = (height <= _FLAT) | (longest == 0.0)
+    first, second = b - a, c - b
+    longest = np.maximum(np.maximum(longest_component(first), longest_component(second)), longest_component(c - a))
+    scale = np.where(longest > 0.0, longest, 1.0)[:, None]  # keeps the products clear of underflow
+    height = lengths(np.cross(first / scale, second / scale))
+    result: Mask = (height <= _FLAT) | (longest == 0.0)
     return result
 
 
 def unit_normals(normals: F64, repairs: Repairs) -> F64:
     """``normals`` (V, 3) at length 1, and 0 where there is no direction; counts those that were of another length."""
-    normals = np.where(np.isfinite(normals).all(axis=1)[:, None], normals, 0.0)
-    largest = np.abs(normals).max(axis=1, initial=0.0)
-    lost = largest < _NO_DIRECTION
-    length = np.linalg.norm(np.clip(normals, -2.0, 2.0), axis=1)
-    repairs.rescaled_normals += int((~lost & (np.abs(length - 1.0) > _UNIT)).sum())
-    return normalized(np.where(lost[:, None], 0.0, normals))
+    largest = longest_component(normals)
+    lost = ~((largest >= _NO_DIRECTION) & np.isfinite(largest))
+    normals = np.where(lost[:, None], 0.0, normals)
+    off = np.abs(lengths(np.clip(normals, -2.0, 2.0)) - 1.0) > _UNIT
+    repairs.rescaled_normals += int((off & ~lost).sum())
+    return normalized(normals)
 
 
 def _with_unit_normals(part: Part, repairs: Repairs) -> Part:
     if part.normals is None or len(part.faces) == 0:
         return part
     normals = unit_normals(part.normals, repairs)
-    lost = ~normals.any(axis=1)
+    lost = longest_component(normals) == 0.0
     if lost.any():
         repairs.replaced_normals += int(lost.sum())
         own = np.zeros_like(normals)

@@ -17,7 +17,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit, uint32
+from numba import uint32
+
+from raytrace.compilation import device
 
 HALTON, HASH = 0, 1
 
@@ -28,7 +30,9 @@ choice of the two lights."""
 _TINY = np.float32(2.0**-24)
 _ONE, _TWO = np.float32(1.0), np.float32(2.0)
 _ZERO = np.float32(0.0)
-_TWO_PI = np.float32(2.0 * math.pi)
+_HALF_PI = np.float32(math.pi / 2.0)
+_S3, _S5, _S7 = np.float32(-1 / 6), np.float32(1 / 120), np.float32(-1 / 5040)
+_C2, _C4, _C6, _C8 = np.float32(-1 / 2), np.float32(1 / 24), np.float32(-1 / 720), np.float32(1 / 40320)
 
 
 def radical_inverse(base: int, count: int) -> np.ndarray:
@@ -46,7 +50,7 @@ def radical_inverse(base: int, count: int) -> np.ndarray:
 _HALTON_2, _HALTON_3 = radical_inverse(2, 16), radical_inverse(3, 16)
 
 
-@njit(error_model="numpy")
+@device
 def wang(value):  # type: ignore[no-untyped-def]
     """Wang's 32-bit integer hash."""
     value = uint32(value)
@@ -57,19 +61,19 @@ def wang(value):  # type: ignore[no-untyped-def]
     return uint32(value ^ (value >> uint32(15)))
 
 
-@njit(error_model="numpy")
+@device
 def unit_float(bits):  # type: ignore[no-untyped-def]
     """[0, 1) from 24 of 32 bits: a division by 2^32 in single precision would round up to 1."""
     return np.float32(uint32(bits) >> uint32(8)) * _TINY
 
 
-@njit(error_model="numpy")
+@device
 def path_key(seed, pixel):  # type: ignore[no-untyped-def]
     """Hash that stands for one pixel of one run."""
     return wang(uint32(wang(uint32(seed) * uint32(0x9E3779B9) + uint32(1))) ^ uint32(pixel))
 
 
-@njit(error_model="numpy")
+@device
 def random_pair(key, frame, pair, generator):  # type: ignore[no-untyped-def]
     """Two numbers in [0, 1) for one pair of dimensions of the path ``key`` in ``frame``."""
     salt = uint32(pair + 1) * uint32(0x85EBCA6B)
@@ -88,7 +92,7 @@ def random_pair(key, frame, pair, generator):  # type: ignore[no-untyped-def]
     return x, y
 
 
-@njit(error_model="numpy")
+@device
 def tangent_frame(nx, ny, nz):  # type: ignore[no-untyped-def]
     """Two unit vectors that complete a unit normal to an orthonormal basis, from the normal alone.
 
@@ -101,19 +105,40 @@ def tangent_frame(nx, ny, nz):  # type: ignore[no-untyped-def]
     return _ONE + sign * nx * nx * a, sign * b, -sign * nx, b, sign + ny * ny * a, -ny
 
 
-@njit(error_model="numpy")
+@device
+def sincos_turn(turns):  # type: ignore[no-untyped-def]
+    """sin and cos of 2π·turns for turns in [0, 1), to 4e-7: Taylor series on an eighth of a turn.
+
+    Faster than the C library's, and the same on every machine.
+    """
+    quarters = turns * np.float32(4.0)
+    nearest = int(quarters + np.float32(0.5))
+    x = (quarters - np.float32(nearest)) * _HALF_PI
+    y = x * x
+    s = x * (_ONE + y * (_S3 + y * (_S5 + y * _S7)))
+    c = _ONE + y * (_C2 + y * (_C4 + y * (_C6 + y * _C8)))
+    quadrant = nearest & 3
+    if quadrant == 0:
+        return s, c
+    if quadrant == 1:
+        return c, -s
+    if quadrant == 2:
+        return -s, -c
+    return -c, s
+
+
+@device
 def sample_cosine(nx, ny, nz, u, v):  # type: ignore[no-untyped-def]
     """Direction about the unit normal with density cos/π per solid angle, and its cosine."""
     r = math.sqrt(u)
-    phi = _TWO_PI * v
-    x = r * np.float32(math.cos(phi))
-    y = r * np.float32(math.sin(phi))
+    sine, cosine = sincos_turn(v)
+    x, y = r * cosine, r * sine
     z = math.sqrt(max(_ZERO, _ONE - u))
     tx, ty, tz, bx, by, bz = tangent_frame(nx, ny, nz)
     return x * tx + y * bx + z * nx, x * ty + y * by + z * ny, x * tz + y * bz + z * nz, z
 
 
-@njit(error_model="numpy")
+@device
 def sample_triangle(u, v):  # type: ignore[no-untyped-def]
     """Barycentrics (of the second and third vertex) of a uniform point on a triangle.
 
@@ -126,7 +151,7 @@ def sample_triangle(u, v):  # type: ignore[no-untyped-def]
     return u - b2, b2
 
 
-@njit(error_model="numpy")
+@device
 def sample_alias(u, threshold, alias):  # type: ignore[no-untyped-def]
     """Index drawn from an alias table (Walker 1977) with one number in [0, 1)."""
     count = threshold.shape[0]

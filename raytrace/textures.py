@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from raytrace.compilation import device
 from raytrace.scene import Texture
 
 F64 = NDArray[np.float64]
@@ -89,7 +89,7 @@ def sample_bilinear(atlas: TextureAtlas, index: int, uvs: F64) -> F64:
     return result
 
 
-@njit(error_model="numpy")
+@device
 def level_for(footprint_texels):  # type: ignore[no-untyped-def]
     """Mip level whose texel is nearest in size to ``footprint_texels`` (level-0 texels)."""
     if not footprint_texels > _ONE:
@@ -97,7 +97,7 @@ def level_for(footprint_texels):  # type: ignore[no-untyped-def]
     return min(int(math.log2(footprint_texels) + _HALF), MAX_LEVELS - 1)
 
 
-@njit(error_model="numpy")
+@device
 def lookup(texels, levels, decode, index, u, v, level):  # type: ignore[no-untyped-def]
     """Bilinear, repeated lookup at a mip level: three linear float32."""
     offset, width, height = levels[index, level, 0], levels[index, level, 1], levels[index, level, 2]

@@ -10,6 +10,7 @@ import moderngl
 import pytest
 
 from gl.executor import SHADER_ROOT, Executor
+from tests.passes.harness import Bench
 from tests.passes.stage import SHADERS, Stage
 
 
@@ -22,3 +23,20 @@ def stage(ctx: moderngl.Context, tmp_path: Path) -> Iterator[Stage]:
     executor = Executor(ctx, tmp_path)
     yield Stage(ctx, tmp_path, executor)
     executor.release()
+
+
+@pytest.fixture(scope="session")
+def _session_bench(
+    _session_context: moderngl.Context, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Bench]:
+    with _session_context:
+        bench = Bench(_session_context, tmp_path_factory.mktemp("shaders"))
+        yield bench
+        bench.release()
+
+
+@pytest.fixture
+def bench(ctx: moderngl.Context, _session_bench: Bench) -> Bench:
+    """The filters on synthetic frames. Programs are compiled once for all tests; each test begins a new sequence."""
+    _session_bench.restart()
+    return _session_bench

@@ -1,0 +1,43 @@
+"""Files that are either whole or not there."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+from errors import UserError
+
+
+def replace_file(path: Path, save: Callable[[Path], object]) -> None:
+    """Let ``save`` write a temporary neighbour of ``path``, then move it into place.
+
+    Missing folders are created. An interruption or an error leaves the file that was there before. Raises UserError
+    where the system refuses.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(prefix=f".{path.stem}.", suffix=path.suffix, dir=path.parent)
+        os.close(handle)
+        temporary = Path(name)
+        try:
+            save(temporary)
+            temporary.chmod(0o644)
+            temporary.replace(path)
+        finally:
+            temporary.unlink(missing_ok=True)
+    except OSError as error:
+        raise UserError(f"{path}: cannot be written ({error.strerror or error})", "check the folder's permissions") from error
+
+
+def require_writable(path: Path) -> None:
+    """Raises UserError unless a file can be written at ``path``: to be asked before the work, not after it."""
+    if path.is_dir():
+        raise UserError(f"{path}: is a folder", "name a file")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=path.parent):
+            pass
+    except OSError as error:
+        raise UserError(f"{path}: cannot be written ({error.strerror or error})", "choose another place with --out") from error
