@@ -22,9 +22,9 @@ lint:
 	$(VENV) -m ruff format --check
 	$(VENV) -m mypy
 
-references: ## regenerate the screenshots' reference images: look at each before committing it
+references: ## regenerate plans, screenshots and quality references: look at each before committing it
 	@$(PYTHON) tools/setup.py test
-	$(VENV) -m pytest tests/screenshots --regenerate
+	$(VENV) -m pytest tests/unit/test_plans.py tests/screenshots tests/quality --regenerate
 
 clean:      ## everything made by running, but the environment (.venv)
 	rm -rf out .cache .pytest_cache .mypy_cache .ruff_cache

@@ -101,7 +101,7 @@ class Render(Section):
 class Svgf(Section):
     """Spatiotemporal variance-guided filter (Schied et al. 2017)."""
 
-    preset: str = param("paper", choices=("paper",), doc="values for the keys of this section that are not set")
+    preset: str = param("best", choices=("paper", "best"), doc="values for the keys of this section that are not set")
     alpha: float = param(0.2, 0, 1, "[0;1] smallest share of the new frame in the accumulated colour; 0: running mean")
     alpha_moments: float = param(0.2, 0, 1, "[0;1] smallest share of the new frame in the luminance moments")
     max_history: int = param(255, 10, 255, "[10;255] longest history counted, in frames")
@@ -112,6 +112,10 @@ class Svgf(Section):
     sigma_z: float = param(1.0, 0.01, 100, "[0.01;100] tolerance for depth, in depth slopes of the surface")
     sigma_n: int = param(128, 1, 1024, "[1;1024] exponent of the cosine between normals; more: sharper")
     sigma_l: float = param(4.0, 0.01, 1000, "[0.01;1000] tolerance for luminance, in standard deviations of the noise")
+    first_sigma_l: float = param(4.0, 0.1, 1000, "[0.1;1000] sigma_l of the first iteration, in sigma_l of the others")
+    accumulated_variance: bool = param(
+        True, doc="scale the variance to that of the accumulated colour after the first iteration", structural=True
+    )
     separate: bool = param(True, doc="filter direct and indirect light apart", structural=True)
     temporal: bool = param(True, doc="accumulate over time", structural=True)
     variance_guided: bool = param(True, doc="steer the luminance weight by the variance", structural=True)
@@ -165,11 +169,15 @@ PRESETS: dict[str, dict[str, dict[str, Value]]] = {
             "sigma_z": 1.0,
             "sigma_n": 128,
             "sigma_l": 4.0,
+            "first_sigma_l": 1.0,
+            "accumulated_variance": False,
             "separate": True,
             "temporal": True,
             "variance_guided": True,
             "demodulate": True,
         },
+        # What measured best in error at equal time on the Cornell flight (gl/passes/svgf.py, deviations).
+        "best": {"first_sigma_l": 4.0, "accumulated_variance": True},
     },
 }
 """section -> value of its ``preset`` key -> values of the keys it owns. A key set by file or ``--set`` wins over it."""

@@ -82,9 +82,10 @@ def read_exr(path: Path) -> F32:
         channels = OpenEXR.File(str(path)).channels()
     except (RuntimeError, ValueError) as error:
         raise UserError(f"{path}: is not a readable EXR ({error})") from error
-    if "RGB" not in channels:
+    colors = channels.get("RGB") or channels.get("RGBA")  # with alpha, OpenEXR joins all four
+    if colors is None:
         raise UserError(f"{path}: has no channels R, G and B (it has {', '.join(channels)})")
-    return np.ascontiguousarray(channels["RGB"].pixels[::-1], dtype=np.float32)
+    return np.ascontiguousarray(colors.pixels[::-1, :, :3], dtype=np.float32)
 
 
 def side_by_side(images: Sequence[U8], gap: int = 4) -> U8:

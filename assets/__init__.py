@@ -29,7 +29,7 @@ SCENES: dict[str, SceneInfo] = {
     info.name: info
     for info in (
         SceneInfo("cornell", "the Cornell box: two blocks and one area light", cornell.build),
-        SceneInfo("interior", "a living room by night: textures, seven lamps and a fire, a toy train", interior.build),
+        SceneInfo("interior", "a living room by night: textures, lamps, a fire, a toy train", interior.build),
     )
 }
 
@@ -42,5 +42,7 @@ def build(name: str, animate: bool = False) -> Scene:
     info = SCENES.get(name)
     if info is None:
         known = ", ".join(SCENES)
-        raise UserError(f"scene {name!r}: no built-in scene of that name{did_you_mean(name, SCENES)}", f"there are: {known}")
+        raise UserError(
+            f"scene {name!r}: no built-in scene of that name{did_you_mean(name, SCENES)}", f"there are: {known}"
+        )
     return info.build(animate=animate)

@@ -18,8 +18,8 @@ _THICKNESS, _HEIGHT, _DEPTH = 0.03, 0.24, 0.17  # metres, of the book that all o
 def _pattern() -> list[Part]:
     """The book that all others are stretched from; its texture coordinates fill one cell of the atlas of spines."""
     t, h, d = _THICKNESS, _HEIGHT, _DEPTH
-    turn = np.linspace(-math.pi / 2, math.pi / 2, 5)
-    points = np.empty((2, 5, 3))
+    turn = np.linspace(-math.pi / 2, math.pi / 2, 4)
+    points = np.empty((2, 4, 3))
     points[:, :, 0] = -(t / 2 - 0.0012) * np.sin(turn)
     points[:, :, 1] = np.array([[0.0], [h]])
     points[:, :, 2] = (0.16 * t + 0.002) * np.cos(turn) - 0.0025
@@ -128,19 +128,17 @@ def bookcase(width: float, height: float, depth: float, shelves: int) -> tuple[l
     """A bookcase against z = 0, its middle at x = 0, and its shelves as (top of the board, headroom)."""
     half, board = width / 2, 0.028
     boards = [
-        block((-half, -0.005, 0.0), (-half + board, height, depth), 0.6),
-        block((half - board, -0.005, 0.0), (half, height, depth), 0.6),
+        block((-half, -0.005, -0.006), (-half + board, height, depth), 0.6),
+        block((half - board, -0.005, -0.006), (half, height, depth), 0.6),
         block((-half - 0.02, height - 0.005, -0.01), (half + 0.02, height + 0.03, depth + 0.025), 0.6),
         block((-half - 0.035, height + 0.028, -0.012), (half + 0.035, height + 0.05, depth + 0.04), 0.6),
-        block((-half + 0.01, -0.004, 0.01), (half - 0.01, 0.085, depth - 0.01), 0.6),
+        block((-half + 0.012, -0.004, 0.012), (half - 0.012, 0.085, depth - 0.01), 0.6),
     ]
-    back = block((-half + 0.01, 0.05, -0.01), (half - 0.01, height - 0.002, 0.03), 0.6)
+    back = block((-half + 0.01, 0.05, -0.01), (half - 0.01, height - 0.002, 0.034), 0.6)
     levels = np.linspace(0.1, height - 0.006, shelves + 1)
     tops = []
     for k in range(shelves):
-        boards.append(
-            block((-half + 0.02, levels[k] - board, 0.02), (half - 0.02, levels[k], depth - 0.006), 0.6)
-        )
+        boards.append(block((-half + 0.02, levels[k] - board, 0.02), (half - 0.02, levels[k], depth - 0.006), 0.6))
         tops.append((float(levels[k]), float(levels[k + 1] - levels[k]) - board))
     return [(join(boards), "walnut"), (back, "walnut dark")], tops
 
@@ -153,5 +151,5 @@ def filled_bookcase(
     books: list[Part] = []
     inside = width - 0.075
     for level, headroom in tops:
-        books += placed(row(rng, inside, headroom, depth - 0.06), 0.0, -inside / 2, level, depth - 0.04)
+        books += placed(row(rng, inside, headroom, depth - 0.1), 0.0, -inside / 2, level, depth - 0.04)
     return case, books

@@ -1,7 +1,7 @@
 """The Cornell box, from the measurements published by the Cornell University Program of Computer Graphics.
 
-https://www.graphics.cornell.edu/online/box/data.html, in units of 100 mm: x to the left as the camera sees it, y up, z away from
-it. The walls' spectra are rounded to the linear RGB in common use; the lamp's radiance is that of Mitsuba's version.
+https://www.graphics.cornell.edu/online/box/data.html, in units of 100 mm: x to the left as the camera sees it, y up,
+z away from it. The walls' spectra are rounded to the linear RGB in common use, as is the lamp's radiance, (17, 12, 4).
 """
 
 from __future__ import annotations

@@ -13,7 +13,14 @@ from assets.surfaces import curve, lathe, ring, rod, sheet, tube
 
 def _leg(height: float, top: float = 0.026, foot: float = 0.016) -> Shape:
     """A turned, tapering leg that stands a millimetre in the floor."""
-    profile = [(0, -0.001), (foot, -0.001), (foot * 1.1, 0.3 * height), (top, 0.85 * height), (top, height), (0, height)]
+    profile = [
+        (0, -0.001),
+        (foot, -0.001),
+        (foot * 1.1, 0.3 * height),
+        (top, 0.85 * height),
+        (top, height),
+        (0, height),
+    ]
     return lathe(profile, 16)
 
 
@@ -37,7 +44,7 @@ def sofa() -> list[Part]:
 
 def pillow(size: float) -> Shape:
     """A scatter cushion, a square of side ``size`` in the xz plane."""
-    return cushion((size, 0.05, size), 0.022, 0.06, inner=6)
+    return cushion((size, 0.036, size), 0.017, 0.082, inner=6)
 
 
 def leaning(shape: Shape, tilt: float, turn: float, x: float, y: float, z: float) -> Shape:
@@ -74,7 +81,7 @@ def armchair() -> list[Part]:
     shell = [
         rounded_box((0.66, 0.18, 0.66), 0.04, texel_metres=0.5).moved(0.0, 0.29, 0.0),
         rounded_box((0.62, 0.78, 0.16), 0.07, 4, texel_metres=0.5).turned("x", -11.0).moved(0.0, 0.7, -0.31),
-        cushion((0.54, 0.15, 0.58), 0.055, 0.04).moved(0.0, 0.44, 0.06),
+        cushion((0.535, 0.15, 0.58), 0.055, 0.04).moved(0.0, 0.44, 0.06),
         cushion((0.5, 0.12, 0.52), 0.05, 0.05).turned("x", 77.0).moved(0.0, 0.76, -0.185),
     ]
     for side in (-1, 1):
@@ -88,12 +95,9 @@ def armchair() -> list[Part]:
 
 def round_table(radius: float, height: float) -> list[Part]:
     """A round table on three splayed legs with a ring between them; its top is at ``height``."""
-    top = lathe(
-        [(0, height - 0.034), (radius - 0.03, height - 0.034), (radius - 0.006, height - 0.022), (radius, height - 0.01)]
-        + [(radius - 0.002, height - 0.003), (radius - 0.008, height), (0, height)],
-        72,
-        30.0,
-    )
+    edge = [(-0.03, -0.034), (-0.006, -0.022), (0.0, -0.01), (-0.002, -0.003), (-0.008, 0.0)]
+    profile = [(0.0, height - 0.034), *((radius + r, height + y) for r, y in edge), (0.0, height)]
+    top = lathe(profile, 72, 30.0)
     flat = top.vertices[:, [0, 2]] / 0.9 + 0.5  # the grain runs across the top, not around it
     top = Shape(top.vertices, top.faces, top.normals, flat.astype(np.float32))
     legs = []
@@ -106,7 +110,7 @@ def round_table(radius: float, height: float) -> list[Part]:
             8,
         )
         legs.append(tube(path, np.linspace(0.013, 0.024, 8), 16))
-    brace = ring(0.77 * radius, 0.016, 64, 10).moved(y=0.3 * height)
+    brace = ring(0.77 * radius, 0.016, 48, 8).moved(y=0.3 * height)
     return [(top, "walnut"), (join(legs), "walnut"), (brace, "brass")]
 
 
@@ -142,7 +146,11 @@ def rug(width: float, depth: float) -> list[Part]:
     rng = np.random.default_rng(9)
     # Tassels point to +x; those of the other end are the same turned by half a turn.
     patterns = [
-        tube(np.array([(-0.004, 0.006, 0), (0.03, 0.005, sway / 2), (0.06, 0.004, sway)]), np.array([0.003, 0.004, 0.003]), 4)
+        tube(
+            np.array([(-0.004, 0.006, 0), (0.03, 0.005, sway / 2), (0.06, 0.004, sway)]),
+            np.array([0.003, 0.004, 0.003]),
+            4,
+        )
         for sway in (-0.011, -0.004, 0.004, 0.011)
     ]
     tassels = [
@@ -166,12 +174,12 @@ def picture(width: float, height: float, cell: tuple[int, int], mount: float, fr
         block((x - 0.004, -y - 0.01, -0.004), (x + rim - 0.001, y + 0.01, 0.029), 0.5),
     ]
     card = block((-x, -y, -0.003), (x, y, 0.01))
-    canvas = _canvas(x - mount, y - mount).mapped((0.5, 0.5), (0.5 * cell[0], 0.5 * cell[1]))
+    canvas = _canvas(x - mount - 0.001, y - mount - 0.001).mapped((0.5, 0.5), (0.5 * cell[0], 0.5 * cell[1]))
     return [(join(mitre), frame), (card, "card"), (canvas, "paintings")]
 
 
 def _canvas(x: float, y: float) -> Shape:
     """A thin slab whose front shows the whole of a texture once."""
-    slab = block((-x, -y, 0.0), (x, y, 0.013))
+    slab = block((-x, -y, 0.002), (x, y, 0.013))
     uvs = (slab.vertices[:, :2] / (2 * np.array([x, y])) + 0.5).astype(np.float32)
     return Shape(slab.vertices, slab.faces, slab.normals, uvs)

@@ -14,8 +14,8 @@ from assets.surfaces import ball, curve, lathe, ring, rod, tube
 def vase(height: float, glaze: str) -> list[Part]:
     """A vase with a wall of its own thickness, y = 0 is what it stands on."""
     h = height
-    outside = curve([(0.2, 0.0), (0.3, 0.2), (0.34, 0.45), (0.22, 0.72), (0.13, 0.86), (0.19, 1.0)], 18) * h
-    inside = curve([(0.17, 0.995), (0.11, 0.86), (0.19, 0.72), (0.3, 0.45), (0.26, 0.2), (0.14, 0.05)], 10) * h
+    outside = curve([(0.2, 0.0), (0.3, 0.2), (0.34, 0.45), (0.22, 0.72), (0.13, 0.86), (0.19, 1.0)], 15) * h
+    inside = curve([(0.17, 0.995), (0.11, 0.86), (0.19, 0.72), (0.3, 0.45), (0.26, 0.2), (0.14, 0.05)], 8) * h
     return [(lathe([(0.0, 0.0), *outside.tolist(), *inside.tolist(), (0.0, 0.05 * h)], 28).moved(y=-0.001), glaze)]
 
 
@@ -25,10 +25,14 @@ def teapot() -> list[Part]:
     lid = [(0.042, 0.124), (0.03, 0.135), (0.012, 0.142), (0.008, 0.148), (0.015, 0.157), (0.01, 0.166), (0.0, 0.168)]
     pot = lathe([(0.0, 0.0), *body, *lid], 36).moved(y=-0.001)
     spout = tube(
-        curve([(0.07, 0.045, 0), (0.105, 0.06, 0), (0.12, 0.1, 0), (0.145, 0.122, 0)], 16), np.linspace(0.02, 0.009, 16), 16
+        curve([(0.07, 0.045, 0), (0.105, 0.06, 0), (0.12, 0.1, 0), (0.145, 0.122, 0)], 16),
+        np.linspace(0.02, 0.009, 16),
+        16,
     )
     handle = tube(
-        curve([(-0.072, 0.1, 0), (-0.11, 0.112, 0), (-0.135, 0.08, 0), (-0.115, 0.045, 0), (-0.08, 0.035, 0)], 24), 0.007, 12
+        curve([(-0.072, 0.1, 0), (-0.11, 0.112, 0), (-0.135, 0.08, 0), (-0.115, 0.045, 0), (-0.08, 0.035, 0)], 24),
+        0.007,
+        12,
     )
     return [(pot.mapped((1.0, 0.7)), "porcelain"), (join([spout, handle]), "china")]
 
@@ -48,7 +52,10 @@ def cup() -> list[Part]:
 def fruit_bowl(seed: int) -> list[Part]:
     """A wooden bowl with oranges and apples."""
     rng = np.random.default_rng(seed)
-    wall = curve([(0.05, 0.0), (0.11, 0.03), (0.15, 0.085)], 14).tolist() + curve([(0.143, 0.085), (0.1, 0.035), (0.0, 0.018)], 14).tolist()
+    wall = (
+        curve([(0.05, 0.0), (0.11, 0.03), (0.15, 0.085)], 14).tolist()
+        + curve([(0.143, 0.085), (0.1, 0.035), (0.0, 0.018)], 14).tolist()
+    )
     wall[-1] = [0.0, 0.018]
     parts: list[Part] = [(lathe([(0.0, 0.0), *wall], 48).moved(y=-0.001), "walnut")]
     places = [(0.07 * math.cos(1.257 * k), 0.075, 0.07 * math.sin(1.257 * k)) for k in range(5)] + [(0.0, 0.125, 0.0)]
@@ -73,13 +80,23 @@ GLOBE_TILT = -23.5
 
 def globe_stand() -> list[Part]:
     """The stand of a floor globe: three feet, a turned pillar, a meridian ring about :data:`GLOBE_CENTRE`."""
-    pillar = [(0, 0.1), (0.03, 0.1), (0.042, 0.14), (0.02, 0.2), (0.03, 0.3), (0.018, 0.4), (0.02, 0.44), (0.05, 0.462), (0, 0.47)]
+    pillar = [
+        (0, 0.1),
+        (0.03, 0.1),
+        (0.042, 0.14),
+        (0.02, 0.2),
+        (0.03, 0.3),
+        (0.018, 0.4),
+        (0.02, 0.44),
+        (0.05, 0.462),
+        (0, 0.47),
+    ]
     feet = []
     for k in range(3):
         path = curve([(0.0, 0.16, 0.0), (0.1, 0.13, 0.0), (0.19, 0.04, 0.0), (0.24, 0.018, 0.0)], 14)
         feet.append(tube(path, np.linspace(0.02, 0.015, 14), 12).turned("y", 120.0 * k + 20))
     x, y, z = GLOBE_CENTRE
-    meridian = ring(0.245, 0.014, 72, 10).turned("x", 90.0).moved(x, y, z)
+    meridian = ring(0.245, 0.014, 56, 8).turned("x", 90.0).moved(x, y, z)
     pins = join([rod(0.006, 0.03, 8).moved(y=0.218), rod(0.006, 0.03, 8).moved(y=-0.248)])
     return [
         (join([lathe(pillar, 32), *feet]), "walnut"),
@@ -127,8 +144,12 @@ def _locomotive() -> list[Part]:
     cab = rounded_box((0.066, 0.06, 0.05), 0.004, 1).moved(0.0, 0.076, 0.045)
     roof = rounded_box((0.078, 0.008, 0.064), 0.003, 1).moved(0.0, 0.109, 0.045)
     frame = box((0.056, 0.016, 0.15)).moved(0.0, 0.042, -0.005)
-    buffer = prism([(-0.03, 0.0), (0.03, 0.0), (0.03, 0.012), (-0.03, 0.012)], 0.03).turned("x", 25.0).moved(0, 0.02, -0.1)
-    chimney = lathe([(0, 0), (0.008, 0), (0.008, 0.03), (0.014, 0.045), (0.01, 0.046), (0, 0.04)], 20).moved(0, 0.092, -0.05)
+    buffer = (
+        prism([(-0.03, 0.0), (0.03, 0.0), (0.03, 0.012), (-0.03, 0.012)], 0.03).turned("x", 25.0).moved(0, 0.02, -0.1)
+    )
+    chimney = lathe([(0, 0), (0.008, 0), (0.008, 0.03), (0.014, 0.045), (0.01, 0.046), (0, 0.04)], 20).moved(
+        0, 0.092, -0.05
+    )
     dome = lathe([(0, 0), (0.011, 0), (0.011, 0.01), (0.007, 0.017), (0, 0.019)], 20).moved(0, 0.09, -0.015)
     return [
         (join([boiler, cab]), "train red"),
@@ -164,8 +185,8 @@ def clock_case() -> list[Part]:
         block((-0.27, 2.015, -0.004), (0.27, 2.045, 0.27), 0.6),
         block((-0.2, 2.04, -0.003), (0.2, 2.08, 0.2), 0.6),
     ]
-    back = block((-0.17, 0.405, -0.004), (0.17, 1.605, 0.02), 0.6)
-    rim = ring(0.185, 0.024, 64, 12).turned("x", 90.0).moved(0, 1.815, 0.236)
+    back = block((-0.17, 0.405, -0.004), (0.17, 1.605, 0.036), 0.6)
+    rim = ring(0.185, 0.024, 48, 8).turned("x", 90.0).moved(0, 1.815, 0.236)
     knobs = [ball(0.03, 20).moved(x, 2.075, 0.22) for x in (-0.22, 0.22)]
     return [(join(wood), "walnut"), (back, "walnut dark"), (_face(), "dial"), (join([rim, *knobs]), "brass")]
 

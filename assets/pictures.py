@@ -62,12 +62,15 @@ def spines() -> Pixels:
     The lowest 10 % of a cell is plain cloth, which also covers the boards.
     """
     rng = np.random.default_rng(111)
-    cloths = "7b2d26 2f4858 33658a 5b7553 8a6642 3a3238 a23b3b 1f3a2e c49a52 4c3a5e 6d7f8c 94553d 274060 b7a07a 5c1f2b 456b5a"
+    cloths = (
+        "#7b2d26", "#2f4858", "#33658a", "#5b7553", "#8a6642", "#3a3238", "#a23b3b", "#1f3a2e",
+        "#c49a52", "#4c3a5e", "#6d7f8c", "#94553d", "#274060", "#b7a07a", "#5c1f2b", "#456b5a",
+    )  # fmt: skip
     cell_h, cell_w = 1024 // SPINE_ROWS, 1024 // SPINE_COLUMNS
     image = np.empty((3, 1024, 1024), dtype=np.float32)
     for cell in range(SPINE_ROWS * SPINE_COLUMNS):
         top, left = cell // SPINE_COLUMNS * cell_h, cell % SPINE_COLUMNS * cell_w
-        cloth = colour("#" + cloths.split()[rng.integers(16)]) * rng.uniform(0.8, 1.25) + rng.uniform(-0.03, 0.03, (3, 1, 1))
+        cloth = colour(cloths[rng.integers(16)]) * rng.uniform(0.8, 1.25) + rng.uniform(-0.03, 0.03, (3, 1, 1))
         image[:, top : top + cell_h, left : left + cell_w] = _spine(rng, cell_h, cell_w, cloth.astype(np.float32))
     return pixels(image * (0.9 + 0.2 * noise(rng, 1024, 1024, 256, 256, 2)))
 

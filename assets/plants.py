@@ -8,8 +8,7 @@ import numpy as np
 
 from assets.shapes import Shape, join
 from assets.stage import Part
-from assets.surfaces import lathe, tube
-from assets.surfaces import sheet as make_sheet
+from assets.surfaces import curve, lathe, sheet, tube
 from raytrace.scene import F64
 
 
@@ -23,13 +22,13 @@ def leaf(length: float, width: float, droop: float, fold: float, rows: int = 6, 
     bend = droop * (t[1:] + t[:-1]) / 2
     steps = length / (rows - 1) * np.stack([np.sin(bend), np.cos(bend)], axis=1)  # down, forward
     spine = np.concatenate([[[0.0, 0.0]], np.cumsum(steps, axis=0)])
-    half = width / 2 * (0.06 + 0.94 * np.sin(math.pi * t**0.75) ** 0.8 * (1 - 0.12 * t))
+    half = width / 2 * (0.12 + 0.88 * np.sin(math.pi * t**0.75) ** 0.8 * (1 - 0.12 * t))
     side = np.linspace(-1.0, 1.0, columns)
     points: F64 = np.empty((rows, columns, 3))
     points[..., 0] = half[:, None] * side
     points[..., 1] = -spine[:, :1] + fold * half[:, None] * np.abs(side)
     points[..., 2] = spine[:, 1:]
-    return make_sheet(points, 0.0012)
+    return sheet(points, 0.0012)
 
 
 def pot(radius: float, height: float) -> list[Part]:
@@ -37,7 +36,9 @@ def pot(radius: float, height: float) -> list[Part]:
     wall = [(0.0, -0.001), (0.72 * radius, -0.001), (0.74 * radius, 0.01), (0.93 * radius, 0.78 * height)]
     wall += [(radius, 0.79 * height), (1.02 * radius, 0.99 * height), (0.99 * radius, height), (0.92 * radius, height)]
     wall += [(0.9 * radius, 0.86 * height), (0.0, 0.85 * height)]
-    earth = lathe([(0.0, 0.84 * height), (0.905 * radius, 0.84 * height), (0.6 * radius, 0.9 * height), (0, 0.91 * height)], 32)
+    earth = lathe(
+        [(0.0, 0.84 * height), (0.905 * radius, 0.84 * height), (0.6 * radius, 0.9 * height), (0, 0.91 * height)], 32
+    )
     return [(lathe(wall, 48), "terracotta"), (earth, "earth")]
 
 
@@ -80,12 +81,12 @@ def palm(seed: int, size: float) -> list[Part]:
     for k in range(fronds):
         turn, inner = 137.5 * k, k / fronds
         length = size * (1.15 - 0.4 * inner) * rng.uniform(0.9, 1.05)
-        t = np.linspace(0.0, 1.0, 16)
-        pitch = math.radians(86 - 26 * inner) - (0.9 + 1.0 * inner) * t**1.3 * rng.uniform(0.85, 1.15)
+        t = np.linspace(0.0, 1.0, 11)
+        pitch = math.radians(86 - 26 * inner) - (0.7 + 0.8 * inner) * t**1.3 * rng.uniform(0.85, 1.15)
         steps = np.diff(t)[:, None] * length * np.stack([np.sin(pitch[1:]), np.cos(pitch[1:])], axis=1)
         spine = np.concatenate([[[0.0, 0.0]], np.cumsum(steps, axis=0)])
-        path = np.stack([np.zeros(16), 0.3 + spine[:, 0], 0.03 + spine[:, 1]], axis=1)
-        frond = [tube(path, np.linspace(0.008, 0.0025, 16), 6)]
+        path = np.stack([np.zeros(11), 0.3 + spine[:, 0], 0.03 + spine[:, 1]], axis=1)
+        frond = [tube(path, np.linspace(0.008, 0.0025, 11), 6)]
         blades = []
         for i in range(12):
             at = 0.26 + 0.74 * i / 12
@@ -105,16 +106,17 @@ def ivy(seed: int, strands: int, length: float) -> list[Part]:
     rng = np.random.default_rng(seed)
     scale = 0.42
     parts: list[Part] = [(shape.scaled(scale), material) for shape, material in pot(0.19, 0.3)]
-    blades = [leaf(0.046, 0.04, droop, 0.2, 4, 3) for droop in (0.25, 0.5, 0.75)]
+    blades = [leaf(0.05, 0.038, droop, 0.15, 4, 3) for droop in (0.25, 0.5, 0.75)]
     stems, leaves = [], []
     for k in range(strands):
         way = math.radians(-70 + 140 * (k + 0.5) / strands + rng.uniform(-8, 8))
-        fall = length * rng.uniform(0.45, 1.0)
-        t = np.linspace(0.0, 1.0, 14)
-        out = 0.05 + 0.1 * np.minimum(3 * t, 1.0) + 0.015 * np.sin(7 * t + k)
-        drop = 0.13 + 0.035 * np.sin(math.pi * np.minimum(3.5 * t, 1.0)) - fall * np.maximum(t - 0.16, 0.0) ** 1.15
-        sway = 0.02 * np.sin(9 * t + 2.0 * k)
-        path = np.stack([out * math.sin(way) + sway, drop, out * max(math.cos(way), 0.55)], axis=1)
+        fall, sway = length * rng.uniform(0.45, 1.0), rng.uniform(-0.03, 0.03, 3)
+        # Out of the pot, over its edge, down: distance in front of the pot's axis, height, drift to the side.
+        controls = [(0.02, 0.11, 0.0), (0.06, 0.15, 0.0), (0.105, 0.13, 0.0), (0.13, 0.04, sway[0])]
+        controls += [(0.135, -0.5 * fall, sway[1]), (0.13, 0.1 - fall, sway[2])]
+        out, drop, drift = curve(controls, 22).T
+        t = np.linspace(0.0, 1.0, 22)
+        path = np.stack([out * math.sin(way) + drift, drop, out * max(math.cos(way), 0.55)], axis=1)
         stems.append(tube(path, 0.0018, 5))
         count = int(fall / 0.03)
         for i in range(count):

@@ -42,7 +42,9 @@ def build(stage: Stage) -> None:
     """Add the room to a stage that has the interior's materials."""
     stage.add("shell", _shell())
     stage.add("panelling", [part for wall in _WALLS for part in against(_panelling(wall), wall)])
-    stage.add("beams", [(block((-3.05, BEAM_UNDERSIDE, z - 0.09), (3.05, 2.83, z + 0.09), 0.6), "beam") for z in BEAMS_Z])
+    stage.add(
+        "beams", [(block((-3.05, BEAM_UNDERSIDE, z - 0.09), (3.05, 2.83, z + 0.09), 0.6), "beam") for z in BEAMS_Z]
+    )
     stage.add("fireplace", against(_fireplace(), "back", FIREPLACE_X))
     stage.add("fire irons", against(_grate(), "back", FIREPLACE_X))
     stage.add("window", against(_window(), "left", 0.15))
@@ -84,8 +86,8 @@ def _panelling(wall: Wall) -> list[Part]:
     skirting = [(-0.01, -0.01), (0.018, -0.01), (0.018, 0.1), (0.012, 0.118), (-0.01, 0.12 - drop)]
     rail = [(-0.01, DADO - 0.03), (0.014, DADO - 0.02), (0.03, DADO - drop), (0.03, DADO + 0.018 - drop)]
     rail += [(0.012, DADO + 0.03 - drop), (-0.01, DADO + 0.03 - drop)]
-    cornice = [(-0.01, HEIGHT - 0.11), (0.01, HEIGHT - 0.11), (0.018, HEIGHT - 0.085 - drop), (0.055, HEIGHT - 0.03)]
-    cornice += [(0.075, HEIGHT - 0.022 - drop), (0.075, HEIGHT + 0.01), (-0.01, HEIGHT + 0.01)]
+    cornice = [(-0.01, HEIGHT - 0.11), (0.004, HEIGHT - 0.11), (0.018, HEIGHT - 0.085 - drop), (0.058, HEIGHT - 0.036)]
+    cornice += [(0.075, HEIGHT - 0.016 - drop), (0.075, HEIGHT + 0.01), (-0.01, HEIGHT + 0.01)]
     mouldings = [_strip(profile, start, end) for profile in (skirting, rail, cornice)]
     count = 7 if long_wall else 6
     pitch = 2 * half / count
@@ -95,8 +97,8 @@ def _panelling(wall: Wall) -> list[Part]:
         for lower, upper in (
             ((left, low, -0.01), (right, low + 0.03, 0.012)),
             ((left, high - 0.03, -0.01), (right, high, 0.012)),
-            ((left, low + 0.01, -0.01), (left + 0.03, high - 0.01, 0.011)),
-            ((right - 0.03, low + 0.01, -0.01), (right, high - 0.01, 0.011)),
+            ((left + 0.001, low + 0.01, -0.01), (left + 0.03, high - 0.01, 0.011)),
+            ((right - 0.03, low + 0.01, -0.01), (right - 0.001, high - 0.01, 0.011)),
         ):
             mouldings.append(block(lower, upper))
     return [(join(mouldings), "paint")]
@@ -110,10 +112,10 @@ def _fireplace() -> list[Part]:
         block((jamb, -0.01, -0.01), (half, 1.12, depth), 0.64),
         block((-jamb - 0.01, lintel, -0.008), (jamb + 0.01, 1.115, depth + 0.012), 0.64),
     ]
-    breast = block((-half + 0.03, 1.1, -0.01), (half - 0.03, HEIGHT + 0.01, depth - 0.06), 1.5)
-    ledge = prism([(0, 1.09), (0, 1.05), (0.3, 1.05), (0.44, 1.05), (0.49, 1.09), (0.49, 1.1), (0, 1.1)], 1.9)
+    breast = block((-half + 0.03, 1.097, -0.01), (half - 0.03, HEIGHT + 0.01, depth - 0.06), 1.5)
+    ledge = prism([(-0.006, 1.05), (0.44, 1.05), (0.49, 1.09), (0.49, 1.1), (-0.006, 1.1)], 1.9)
     shelf = block((-half - 0.12, 1.095, -0.005), (half + 0.12, 1.16, depth + 0.16), 0.8)
-    slab = block((-half - 0.06, -0.02, 0.05), (half + 0.06, 0.055, depth + 0.42), 1.2)
+    slab = block((-half - 0.06, -0.02, 0.046), (half + 0.06, 0.055, depth + 0.42), 1.2)
     soot = block((-jamb - 0.005, 0.02, -0.005), (jamb + 0.005, lintel + 0.005, 0.05), 0.64)
     return [
         (join(bricks), "brick"),
@@ -138,7 +140,11 @@ def _grate() -> list[Part]:
             irons.append(rod(0.011, 0.1, 8).moved(x, 0.04, z))
     rng = np.random.default_rng(5)
     logs = []
-    for x, y, z, yaw, size in ((0, 0.18, 0.17, 4, 0.045), (0.01, 0.18, 0.29, -5, 0.042), (-0.02, 0.26, 0.235, 14, 0.04)):
+    for x, y, z, yaw, size in (
+        (0, 0.18, 0.17, 4, 0.045),
+        (0.01, 0.18, 0.29, -5, 0.042),
+        (-0.02, 0.26, 0.235, 14, 0.04),
+    ):
         along = np.linspace(-0.27, 0.27, 9)
         path = np.stack([along, 0.008 * np.sin(9 * along + 3 * yaw), 0.01 * np.cos(7 * along)], axis=1)
         logs.append(tube(path, size * rng.uniform(0.88, 1.1, 9), 14).turned("y", yaw).moved(x, y, z))
@@ -155,7 +161,7 @@ def _grate() -> list[Part]:
 def _flame(height: float, bend: float) -> Shape:
     """A tongue of fire from y = 0, that sways by ``bend`` along x: few triangles, because it is a light."""
     t = np.array([0.0, 0.18, 0.42, 0.7, 1.0])
-    path = np.stack([bend * np.sin(4.5 * t), height * t, np.zeros(5)], axis=1)
+    path = np.stack([bend * np.sin(3.4 * t), height * t, np.zeros(5)], axis=1)
     return tube(path, 0.16 * height * np.array([0.35, 0.85, 1.0, 0.55, 0.06]), 5)
 
 
@@ -167,12 +173,12 @@ def _window() -> list[Part]:
         block((-half - 0.06, low - 0.05, -0.01), (-half + 0.02, high + 0.05, 0.05)),
         block((half - 0.02, low - 0.05, -0.01), (half + 0.06, high + 0.05, 0.05)),
         block((-half - 0.05, high - 0.02, -0.01), (half + 0.05, high + 0.06, 0.048)),
-        block((-half - 0.12, low - 0.04, -0.01), (half + 0.12, low + 0.015, 0.13)),
-        block((-0.035, low, -0.01), (0.035, high, 0.042)),
+        block((-half - 0.1, low - 0.04, -0.01), (half + 0.1, low + 0.015, 0.062)),
+        block((-0.035, low + 0.002, -0.01), (0.035, high - 0.002, 0.042)),
     ]
     for k in (1, 2):
         y = low + (high - low) * k / 3
-        frame.append(block((-half, y - 0.014, -0.01), (half, y + 0.014, 0.03)))
+        frame.append(block((-half + 0.004, y - 0.014, -0.01), (half - 0.004, y + 0.014, 0.033)))
     rail = rod(0.016, 2.8, 16).turned("z", 90.0).moved(1.4, 2.42, 0.13)
     ends = [ball(0.035, 20).moved(x, 2.42, 0.13) for x in (-1.42, 1.42)]
     brackets = [block((x - 0.012, 2.40, -0.01), (x + 0.012, 2.43, 0.125)) for x in (-1.3, 1.3)]
@@ -182,30 +188,32 @@ def _window() -> list[Part]:
 def _curtain(start: float, end: float, seed: int) -> Shape:
     """Heavy cloth in folds that open towards the hem, hanging from the rod, in the frame of the wall."""
     rng = np.random.default_rng(seed)
-    rows, columns, folds = 16, 105, 7
+    rows, columns, folds = 14, 100, 5.5
     fall = np.linspace(0.0, 1.0, rows)[:, None]  # 0 at the rod, 1 at the hem
     across = np.linspace(0.0, 1.0, columns)[None, :]
-    wander = rng.uniform(-0.35, 0.35, folds + 1)
-    phase = 2 * math.pi * (folds * across + fall * np.interp(across[0], np.linspace(0, 1, folds + 1), wander))
-    swell = 0.026 + 0.022 * fall**0.7
+    start_a, start_b = rng.uniform(0.0, 2 * math.pi, 2)
+    wander = 0.1 * np.sin(7.0 * across + start_a) + 0.06 * np.sin(15.0 * across + start_b)
+    phase = 2 * math.pi * (folds * across + fall * wander)
+    swell = 0.025 + 0.017 * fall**0.7
     outwards = 0.13 + swell * np.sin(phase) + 0.012 * np.sin(3.1 * fall + 5 * across)
-    sideways = start + (end - start) * across + 0.014 * np.sin(2 * phase) * (0.4 + fall) + 0.02 * fall * (across - 0.5)
+    sideways = start + (end - start) * across + 0.02 * fall * (across - 0.5)
     points: F64 = np.empty((rows, columns, 3))
     points[..., 0], points[..., 1], points[..., 2] = sideways, 2.4 - 2.37 * fall, outwards
-    return sheet(points, 0.004, (3.0, 4.0))
+    return sheet(points, 0.003, (3.0, 4.0))
 
 
 def _door() -> list[Part]:
     """A panelled door, closed, with its frame, in the frame of the wall."""
     leaf = [block((-0.42, 0.008, -0.01), (0.42, 2.04, 0.028))]
-    for low, high in ((0.16, 0.78), (0.92, 1.36), (1.5, 1.92)):
+    for low, high in ((0.163, 0.783), (0.923, 1.363), (1.503, 1.923)):
         for left in (-0.34, 0.05):
-            leaf.append(block((left, low, 0.0), (left + 0.29, high, 0.038)))
-            leaf.append(block((left + 0.03, low + 0.03, 0.0), (left + 0.26, high - 0.03, 0.046)))
+            leaf.append(block((left, low, 0.004), (left + 0.29, high, 0.038)))
+            leaf.append(block((left + 0.03, low + 0.03, 0.006), (left + 0.26, high - 0.03, 0.046)))
     frame = [
         block((-0.52, -0.01, -0.01), (-0.415, 2.13, 0.06)),
         block((0.415, -0.01, -0.01), (0.52, 2.13, 0.06)),
         block((-0.54, 2.035, -0.01), (0.54, 2.16, 0.066)),
     ]
-    knob = [rod(0.012, 0.05, 12).turned("x", 90.0), ball(0.028, 20).moved(z=0.06), rod(0.03, 0.006, 16).turned("x", 90.0)]
+    knob = [rod(0.012, 0.05, 12).turned("x", 90.0), ball(0.028, 20).moved(z=0.06)]
+    knob.append(rod(0.03, 0.006, 16).turned("x", 90.0).moved(z=0.001))
     return [(join(leaf + frame), "paint"), (join(knob).moved(0.36, 1.0, 0.026), "brass")]

@@ -50,9 +50,9 @@ class Shape:
     def stretched(self, x: float = 1.0, y: float = 1.0, z: float = 1.0) -> Shape:
         """The shape scaled along the axes, each factor > 0; normals go by the inverse transpose."""
         factors = np.array([x, y, z])
-        normals = self.normals / factors.astype(np.float32)
+        normals = self.normals / factors
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-        return replace(self, vertices=self.vertices * factors, normals=normals)
+        return replace(self, vertices=self.vertices * factors, normals=normals.astype(np.float32))
 
     def mapped(self, scale: tuple[float, float] = (1.0, 1.0), shift: tuple[float, float] = (0.0, 0.0)) -> Shape:
         """The shape with texture coordinates ``uv * scale + shift``."""
@@ -186,10 +186,9 @@ def rounded_box(
     for (row, column), normal, sign in _SIDES:
         rows = _rounded_steps(half[row], radius, segments, inner)
         columns = _rounded_steps(half[column], radius, segments, inner)
-        on_cube = np.empty((len(rows), len(columns), 3))
-        on_cube[..., row], on_cube[..., column] = rows[:, None], columns[None, :]
-        on_cube[..., normal] = sign * half[normal]
-        on_cube = on_cube.reshape(-1, 3)
+        on_cube = np.empty((len(rows) * len(columns), 3))
+        on_cube[:, row], on_cube[:, column] = np.repeat(rows, len(columns)), np.tile(columns, len(rows))
+        on_cube[:, normal] = sign * half[normal]
         core = np.clip(on_cube, radius - half, half - radius)
         normals = on_cube - core
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
@@ -207,7 +206,7 @@ def cushion(
 
     y' = y (1 + b(x, z) / h) with b = bulge (1 - (x/X)²)(1 - (z/Z)²); normals by the inverse transpose of its Jacobian.
     """
-    shape = rounded_box(size, radius, 3, inner, texel_metres)
+    shape = rounded_box(size, radius, 2, inner, texel_metres)
     x, y, z = shape.vertices.T
     half_x, half_y, half_z = (side / 2 for side in size)
     across_x, across_z = 1 - (x / half_x) ** 2, 1 - (z / half_z) ** 2
@@ -221,17 +220,23 @@ def cushion(
 
 
 def prism(
-    outline: Sequence[Sequence[float]], depth: float, crease_degrees: float = 35.0, texel_metres: float = 1.0
+    outline: Sequence[Sequence[float]] | F64, depth: float, crease_degrees: float = 35.0, texel_metres: float = 1.0
 ) -> Shape:
     """An outline in the xy plane, counter-clockwise and star-shaped about its mean, drawn out from z = 0 to ``depth``.
 
-    Corners flatter than ``crease_degrees`` are shaded round.
+    Corners flatter than ``crease_degrees`` are shaded round. Raises ValueError where the mean does not see every edge
+    from its left.
     """
     ring = np.array(outline, dtype=np.float64)
     count = len(ring)
     steps = np.roll(ring, -1, axis=0) - ring
+    spokes = ring.mean(0) - ring
+    if (steps[:, 0] * spokes[:, 1] <= steps[:, 1] * spokes[:, 0]).any():
+        raise ValueError("the outline must be counter-clockwise and star-shaped about its mean")
     lengths = np.linalg.norm(steps, axis=1)
-    starts, ends = crease_normals(np.stack([steps[:, 1], -steps[:, 0]], axis=1) / lengths[:, None], crease_degrees, True)
+    starts, ends = crease_normals(
+        np.stack([steps[:, 1], -steps[:, 0]], axis=1) / lengths[:, None], crease_degrees, True
+    )
     along = np.concatenate([[0.0], np.cumsum(lengths)])
 
     points = np.stack([ring, np.roll(ring, -1, axis=0)], axis=1)  # (count, 2 ends, 2)
@@ -258,7 +263,9 @@ def _fan(ring: F64, z: float, sign: float, texel_metres: float) -> Shape:
     count = len(ring)
     index = np.arange(count)
     following = (index + 1) % count
-    faces = np.stack([np.full(count, count), index, following] if sign > 0 else [np.full(count, count), following, index])
+    faces = np.stack(
+        [np.full(count, count), index, following] if sign > 0 else [np.full(count, count), following, index]
+    )
     vertices = np.concatenate([flat, np.full((count + 1, 1), z)], axis=1)
     normals = np.tile(np.array([0.0, 0.0, sign], dtype=np.float32), (count + 1, 1))
     return Shape(vertices, np.ascontiguousarray(faces.T, dtype=np.int32), normals, _metres(flat, texel_metres))

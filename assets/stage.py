@@ -16,9 +16,7 @@ Part = tuple[Shape, str]
 """A shape and the name of its material."""
 
 
-def placed(
-    parts: list[Part], turn_degrees: float = 0.0, x: float = 0.0, y: float = 0.0, z: float = 0.0
-) -> list[Part]:
+def placed(parts: list[Part], turn_degrees: float = 0.0, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> list[Part]:
     """The parts turned about the y axis through their origin and then carried to (x, y, z)."""
     if turn_degrees:
         parts = [(shape.turned("y", turn_degrees), material) for shape, material in parts]

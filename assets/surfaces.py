@@ -30,13 +30,17 @@ def lathe(profile: Sequence[Sequence[float]] | F64, segments: int = 48, crease_d
     """Surface of revolution about the y axis.
 
     ``profile``: points (radius, y). It goes up on the outside; a solid starts and ends on the axis (radius 0). Corners
-    sharper than ``crease_degrees`` stay sharp. u runs once around, v from 0 to 1 along the profile.
+    sharper than ``crease_degrees`` stay sharp. u runs once around, to the right as seen from outside; v from 0 to 1
+    along the profile.
     """
     line = np.maximum(np.array(profile, dtype=np.float64), [0.0, -np.inf])
     steps = np.diff(line, axis=0)
     lengths = np.linalg.norm(steps, axis=1)
     outward = np.stack([steps[:, 1], -steps[:, 0]], axis=1) / lengths[:, None]
     starts, ends = crease_normals(outward, crease_degrees, closed=False)
+    for row, end in ((starts, 0), (ends, -1)):  # on the axis a soft end meets its own mirror image
+        if line[end, 0] == 0.0 and abs(row[end, 1]) > math.cos(math.radians(crease_degrees / 2)):
+            row[end] = 0.0, math.copysign(1.0, row[end, 1])
     # Two rows of points per step of the profile, so that neighbouring steps may differ in their normals.
     rows = np.stack([line[:-1], line[1:]], axis=1).reshape(-1, 2)
     row_normals = np.stack([starts, ends], axis=1).reshape(-1, 2)
@@ -52,7 +56,7 @@ def lathe(profile: Sequence[Sequence[float]] | F64, segments: int = 48, crease_d
         swept: F64 = pairs[:, :1, None] * direction + pairs[:, 1:, None] * up
         return swept.reshape(-1, 3)
 
-    u, v = np.meshgrid(np.linspace(0.0, 1.0, segments + 1), row_v)
+    u, v = np.meshgrid(np.linspace(1.0, 0.0, segments + 1), row_v)
     count = len(rows)
     faces = grid_faces(count, segments + 1).reshape(2, count - 1, segments, 3)[:, ::2]  # rows 1-2, 3-4, ... coincide
     pole = rows[:, 0] == 0.0
@@ -66,7 +70,7 @@ def lathe(profile: Sequence[Sequence[float]] | F64, segments: int = 48, crease_d
 
 
 def ball(radius: float, segments: int = 32) -> Shape:
-    """A sphere about the origin; u runs once around the y axis, v from the south pole (0) to the north pole (1)."""
+    """A sphere about the origin; u runs once eastwards, v from the south pole (0) to the north pole (1)."""
     latitude = np.linspace(-math.pi / 2, math.pi / 2, segments // 2 + 1)
     profile = radius * np.stack([np.cos(latitude), np.sin(latitude)], axis=1)
     profile[[0, -1], 0] = 0.0
@@ -150,7 +154,9 @@ def sheet(points: F64, thickness: float, repeats: tuple[float, float] = (1.0, 1.
     # The rim, walked so that the front lies on the left: down the first column, along the last row, up, and back.
     down, along = np.arange(rows), np.arange(columns)
     row = np.concatenate([down[:-1], np.full(columns - 1, rows - 1), down[:0:-1], np.zeros(columns, dtype=np.int64)])
-    column = np.concatenate([np.zeros(rows - 1, dtype=np.int64), along[:-1], np.full(rows - 1, columns - 1), along[::-1]])
+    column = np.concatenate(
+        [np.zeros(rows - 1, dtype=np.int64), along[:-1], np.full(rows - 1, columns - 1), along[::-1]]
+    )
     return join([*sides, _hem(front[row, column], back[row, column], uvs[row, column])])
 
 

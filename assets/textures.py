@@ -1,9 +1,8 @@
 """Procedural textures of building materials, drawn with NumPy from fixed seeds.
 
 Every function returns (h, w, 3) uint8, sRGB-encoded, row 0 = bottom row, and repeats without a seam in both directions
-unless it says otherwise. While a texture is being drawn it is an image of float32 planes, (3, h, w), mixed in sRGB as on a
-painter's palette. Pictures (rug, paintings, globe, ...) are
-in :mod:`assets.pictures`.
+unless it says otherwise. While a texture is being drawn it is an image of float32 planes, (3, h, w), mixed in sRGB as
+on a painter's palette. Pictures (rug, paintings, globe, ...) are in :mod:`assets.pictures`.
 """
 
 from __future__ import annotations
@@ -17,6 +16,8 @@ from raytrace.scene import F32
 
 Pixels = NDArray[np.uint8]
 I64 = NDArray[np.int64]
+Field = NDArray[np.float32] | NDArray[np.float64] | NDArray[np.bool_]
+"""One number per pixel, (h, w): a height, a distance, a mask."""
 
 
 def colour(hex_code: str) -> F32:
@@ -38,12 +39,12 @@ def pixels(image: F32) -> Pixels:
     return np.ascontiguousarray(quantised.transpose(1, 2, 0))
 
 
-def blend(a: F32, b: F32, amount: F32) -> F32:
+def blend(a: F32, b: F32, amount: Field) -> F32:
     """``a`` where ``amount`` (h, w) is 0, ``b`` where it is 1; both (3, h, w) images or :func:`colour`."""
-    return a + (b - a) * np.clip(amount, 0.0, 1.0)
+    return a + (b - a) * np.clip(amount, 0.0, 1.0).astype(np.float32)
 
 
-def step(edge: float, x: F32, softness: float) -> F32:
+def step(edge: float, x: Field, softness: float) -> F32:
     """0 below ``edge``, 1 above it, a linear ramp of width ``softness`` between."""
     return np.clip((x - edge) / softness + 0.5, 0.0, 1.0).astype(np.float32)
 
@@ -57,9 +58,7 @@ def coordinates(height: int, width: int) -> tuple[F32, F32]:
     return u, v
 
 
-def noise(
-    rng: np.random.Generator, height: int, width: int, cells_v: int, cells_u: int, octaves: int = 1
-) -> F32:
+def noise(rng: np.random.Generator, height: int, width: int, cells_v: int, cells_u: int, octaves: int = 1) -> F32:
     """Value noise in [0, 1], (h, w) float32, repeating in both directions; each octave has twice the cells, half the
     weight."""
     total = np.zeros((height, width), dtype=np.float32)

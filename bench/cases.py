@@ -24,17 +24,20 @@ QUICK_SIZE = (160, 90)
 
 @dataclass(frozen=True)
 class Effort:
-    """``samples``: paths per pixel of references; ``slice``: those traced between two saves; ``repeats`` of everything
-    timed; ``memory_frames``: length of the run that watches memory, 0 = none."""
+    """``samples``: paths per pixel of references; ``slice``: those traced between two saves; ``repeats`` of the
+    methods' sequence and ``tracing_repeats`` of the tracer's; ``memory_frames``: length of the run that watches memory,
+    0 = none.
+    """
 
     samples: int
     slice: int
     repeats: int
+    tracing_repeats: int
     memory_frames: int
 
 
-FULL = Effort(samples=1024, slice=64, repeats=4, memory_frames=1000)
-QUICK = Effort(samples=64, slice=8, repeats=1, memory_frames=0)
+FULL = Effort(samples=1024, slice=64, repeats=4, tracing_repeats=2, memory_frames=1000)
+QUICK = Effort(samples=64, slice=8, repeats=1, tracing_repeats=1, memory_frames=0)
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ _CPUINFO = Path("/proc/cpuinfo")
 
 @dataclass(frozen=True)
 class Machine:
-    """``renderer`` and ``opengl`` as the driver names them; ``threads``: those that trace; ``date``: ISO 8601, local."""
+    """``renderer``, ``opengl``: as the driver names them; ``threads``: those that trace; ``date``: ISO 8601, local."""
 
     renderer: str
     opengl: str

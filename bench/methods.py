@@ -1,12 +1,14 @@
 """Speed against error: every method on the same frames.
 
-Frames are traced once and kept. Then, frame by frame, each method filters that frame with a renderer of its own, so that
-a drift of the machine hits all alike and no method voids another's history. On every second frame, shifted by one from
-repeat to repeat, the passes are timed one by one, which drains the pipeline around each; on the others only the frame.
+Frames are traced once and kept. Then, frame by frame, each method filters that frame with a renderer of its own, so
+that a drift of the machine hits all alike and no method voids another's history. On every second frame, shifted by one
+from repeat to repeat, the passes are timed one by one, which drains the pipeline around each; on the others only the
+frame is.
 """
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -20,10 +22,13 @@ from bench.references import Reference, temporal_noise
 from bench.timing import Summary
 from config import Config
 from console import Progress
+from errors import UserError
 from gl.profiler import Profiler, is_software
 from gl.renderer import Renderer, read
 from raytrace.frame import FramePacket
 from raytrace.shot import Shot
+
+NewRenderer = Callable[[], Renderer]
 
 UPLOAD = "upload"
 """What gl/renderer.py calls its first measurement of a frame."""
@@ -73,9 +78,9 @@ class MethodResult:
     """One method on one sequence.
 
     ``milliseconds``: median of a whole frame, upload and all passes; ``wall``: the same by the clock, which on hardware
-    includes what the CPU does meanwhile. ``deviation``: sum of ``passes`` over the frame minus 1; None on hardware, where
-    the frame is that sum. ``rmse`` and ``temporal`` are those of the radiance before anti-aliasing; the ratios divide by
-    the noisy frames' own.
+    includes what the CPU does meanwhile. ``deviation``: sum of ``passes`` over the frame minus 1; None on hardware,
+    where the frame is that sum. ``rmse`` and ``temporal`` are those of the radiance before anti-aliasing; the ratios
+    divide by the noisy frames' own.
     """
 
     name: str
@@ -110,12 +115,20 @@ class QualityResult:
 
 
 class Truth:
-    """References of the scored frames beside what the error is measured on."""
+    """References of the scored frames beside what the error is measured on.
+
+    Raises UserError where a frame shows no surface that does not emit.
+    """
 
     def __init__(self, packets: Sequence[FramePacket], references: dict[int, Reference]) -> None:
         self._packets, self._references = packets, references
         self.radiance = {index: references[index].radiance(packets[index]) for index in SCORED}
         self.masks: dict[int, Mask] = {index: packets[index].emission[..., :3].max(axis=2) == 0.0 for index in SCORED}
+        if blind := [index for index, mask in self.masks.items() if not mask.any()]:
+            raise UserError(
+                f"{packets[0].scene}: frame {blind[0]} shows nothing but sky and light sources",
+                "errors are measured on surfaces: choose a scene whose camera sees some",
+            )
 
     @property
     def samples(self) -> int:
@@ -201,10 +214,15 @@ class _Runner:
             passes=passes,
             deviation=total / wall.median - 1.0 if self._software else None,
             rmse=self.score.rmse(),
-            rmse_ratio=self.score.rmse() / noisy.rmse(),
+            rmse_ratio=_ratio(self.score.rmse(), noisy.rmse()),
             temporal=self.score.temporal(),
-            temporal_ratio=self.score.temporal() / noisy.temporal(),
+            temporal_ratio=_ratio(self.score.temporal(), noisy.temporal()),
         )
+
+
+def _ratio(value: float, unit: float) -> float:
+    """NaN where there is no noise to compare with, as in a scene in darkness."""
+    return value / unit if unit > 0.0 else math.nan
 
 
 def trace(shot: Shot) -> list[FramePacket]:
@@ -221,7 +239,7 @@ def measure(
     packets: Sequence[FramePacket],
     truth: Truth,
     config: Config,
-    new_renderer: Callable[[], Renderer],
+    new_renderer: NewRenderer,
     repeats: int,
     methods: Sequence[Method] = METHODS,
 ) -> tuple[MethodResult, ...]:

@@ -1,7 +1,7 @@
 """Errors of pictures and of sequences against references.
 
-All take linear radiance, (H, W, 3) arrays; ``mask`` (H, W) bool selects the pixels that count (emissive ones do not: they
-bypass the filters, and their brightness would hide every other error).
+All take linear radiance, (H, W, 3) arrays; ``mask`` (H, W) bool selects the pixels that count (emissive ones do not:
+they bypass the filters, and their brightness would hide every other error).
 """
 
 from __future__ import annotations

@@ -85,9 +85,7 @@ def _modulated(illumination: F64, packet: FramePacket) -> F64:
     return np.asarray(illumination * packet.albedo[..., :3] + packet.emission[..., :3], dtype=np.float64)
 
 
-def temporal_noise(
-    now: tuple[Reference, FramePacket], before: tuple[Reference, FramePacket], mask: Mask
-) -> float:
+def temporal_noise(now: tuple[Reference, FramePacket], before: tuple[Reference, FramePacket], mask: Mask) -> float:
     """Estimated temporal difference error that two consecutive references have by their own noise.
 
     That of one pair of halves against the other, scaled as if it were Gaussian.
@@ -160,7 +158,7 @@ def load(path: Path, size: tuple[int, int]) -> Reference:
     if not path.exists():
         return empty
     try:
-        with np.load(path, allow_pickle=False) as data:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
             sums, counts = data["sums"], data["counts"]
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
         print(f"{path}: damaged ({error}); rendering it again", file=sys.stderr)

@@ -67,7 +67,12 @@ def _tracing(scene: str, animate: bool, value: Callable[[TracingResult], float])
 # machine the times mean something else.
 GOALS = (
     Goal("cornell: RMSE of SVGF / noisy", "", 0.06, _method("cornell", APART_TAA.name, lambda m: m.rmse_ratio)),
-    Goal("cornell: temporal error of SVGF / noisy", "", 0.06, _method("cornell", APART_TAA.name, lambda m: m.temporal_ratio)),
+    Goal(
+        "cornell: temporal error of SVGF / noisy",
+        "",
+        0.06,
+        _method("cornell", APART_TAA.name, lambda m: m.temporal_ratio),
+    ),
     Goal("SVGF + TAA, one signal", "ms", 110.0, _method("cornell", ONE_SIGNAL_TAA.name, lambda m: m.milliseconds)),
     Goal("SVGF + TAA, direct and indirect", "ms", 190.0, _method("cornell", APART_TAA.name, lambda m: m.milliseconds)),
     Goal("cornell: tracing", "ms", 60.0, _tracing("cornell", False, lambda t: t.frame.median)),
@@ -105,7 +110,8 @@ def header(report: Report) -> str:
             f"{machine.renderer} (OpenGL {machine.opengl})",
             f"{machine.cpu}, {machine.threads} threads, {machine.system}",
             f"Python {machine.python}, {packages}",
-            f"{render.width}x{render.height}, seed {render.seed}, {machine.date}" + (", --quick" if report.quick else ""),
+            f"{render.width}x{render.height}, seed {render.seed}, {machine.date}"
+            + (", --quick" if report.quick else ""),
         ]
     )
 
@@ -189,10 +195,10 @@ def goals_table(report: Report) -> str:
         value = goal.find(report)
         if value is None:
             continue
-        digits = 0 if goal.limit >= 10 else 1 if goal.unit else 3
         verdict = "" if report.quick else "met" if value <= goal.limit else "missed"
-        rows.append((goal.what, f"{value:.{digits + 1}f}", f"<= {goal.limit:g}", goal.unit, verdict))
-    return table(("goal, 640x360 on two cores with llvmpipe", "measured", "wanted", "", ""), rows) if rows else ""
+        measured, limit = (f"{value:.1f}", f"{goal.limit:.0f}") if goal.unit else (f"{value:.4f}", f"{goal.limit:g}")
+        rows.append((goal.what, f"{measured} {goal.unit}".strip(), f"{limit} {goal.unit}".strip(), verdict))
+    return table(("at 640x360 on two cores with llvmpipe", "measured", "at most", "goal"), rows) if rows else ""
 
 
 def text(report: Report) -> str:

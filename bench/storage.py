@@ -28,7 +28,9 @@ def replace_file(path: Path, save: Callable[[Path], object]) -> None:
         finally:
             temporary.unlink(missing_ok=True)
     except OSError as error:
-        raise UserError(f"{path}: cannot be written ({error.strerror or error})", "check the folder's permissions") from error
+        raise UserError(
+            f"{path}: cannot be written ({error.strerror or error})", "check the folder's permissions"
+        ) from error
 
 
 def require_writable(path: Path) -> None:
@@ -40,4 +42,6 @@ def require_writable(path: Path) -> None:
         with tempfile.TemporaryFile(dir=path.parent):
             pass
     except OSError as error:
-        raise UserError(f"{path}: cannot be written ({error.strerror or error})", "choose another place with --out") from error
+        raise UserError(
+            f"{path}: cannot be written ({error.strerror or error})", "choose another place with --out"
+        ) from error

@@ -5,17 +5,37 @@ No fast-math: a result must not depend on how a loop was vectorised, hence on th
 
 from __future__ import annotations
 
+import hashlib
+import os
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
-from numba import njit
+from numba import config, njit
 
 Compiled = Callable[..., Any]
+
+SOURCES = ("casting", "compilation", "compiled", "embree_native", "embree_run", "kernels", "sampling", "textures")
+"""Modules of this package whose functions and constants go into machine code."""
+
+
+def _cache_folder() -> Path:
+    """A folder for this state of :data:`SOURCES`, where Numba would use one for all.
+
+    Left alone it looks at the file that a kernel stands in and at no other, and goes on using machine code that has
+    former functions and constants of the others compiled in.
+    """
+    here = Path(__file__).parent
+    digest = hashlib.sha256(b"".join((here / f"{name}.py").read_bytes() for name in SOURCES)).hexdigest()
+    return Path(os.environ.get("NUMBA_CACHE_DIR") or here / "__pycache__") / f"kernels-{digest[:16]}"
+
+
+config.CACHE_DIR = str(_cache_folder())  # type: ignore[attr-defined]  # made at run time
 
 # _nrt=False: no reference counting of arrays inside compiled code. Counting is atomic, every row that is looked at
 # counts, and the threads then fight for the same counters: it took a third of the time of the shading kernels. None of
 # them creates or keeps an array, so there is nothing to count.
-_options = {"error_model": "numpy", "_nrt": False}
+_options: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
 
 
 def kernel(function: Callable[..., Any]) -> Compiled:

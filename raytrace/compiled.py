@@ -15,7 +15,7 @@ from errors import UserError
 from raytrace.camera import Camera
 from raytrace.sampling import build_alias
 from raytrace.scene import Mesh, Scene
-from raytrace.textures import TextureAtlas, build_atlas, sample_bilinear
+from raytrace.textures import MAX_LEVELS, TextureAtlas, build_atlas, sample_bilinear
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -223,19 +223,29 @@ def _collect_lights(compiled: CompiledScene) -> Lights:
     )
 
 
-_STRATA = np.array([(i + 0.5, j + 0.5) for i in range(8) for j in range(8) if i + j < 7], dtype=np.float64) / 8
+_PROBES = 8  # along an edge
+_CELLS = [(i, j) for i in range(_PROBES) for j in range(_PROBES - i)]
+_STRATA = [((i + 0.5) / _PROBES, (j + 0.5) / _PROBES) for i, j in _CELLS]
+_SHARES = [1.0 if i + j < _PROBES - 1 else 0.5 for i, j in _CELLS]  # the long side halves the cells that it crosses
 
 
 def _mean_emission(compiled: CompiledScene, triangles: I32) -> F64:
-    """Mean radiance over each of ``triangles``, (n, 3) float64; textured ones are probed at fixed points."""
+    """Mean radiance over each of ``triangles``, (n, 3) float64; textured ones are probed at fixed points.
+
+    Probes read the mip level whose texels are as far apart as they are: a small lamp in a large texture must not fall
+    between them, for a triangle whose mean is 0 is taken for no light at all.
+    """
     materials = compiled.triangle_info[triangles, MATERIAL]
-    radiance = compiled.emission[materials].astype(np.float64)
+    radiance: F64 = compiled.emission[materials].astype(np.float64)
     textures = compiled.material_info[materials, 1] if len(materials) else np.zeros(0, np.int32)
     for index in np.unique(textures[textures >= 0]):
         chosen = np.flatnonzero(textures == index)
         uvs = compiled.triangle_uvs[triangles[chosen]].reshape(-1, 3, 2).astype(np.float64)
-        total = np.zeros((len(chosen), 3))
-        for b, c in _STRATA:
-            total += sample_bilinear(compiled.textures, int(index), (1 - b - c) * uvs[:, 0] + b * uvs[:, 1] + c * uvs[:, 2])
-        radiance[chosen] *= total / len(_STRATA)
+        texels_apart = (np.ptp(uvs, axis=1) * compiled.textures.levels[index, 0, 1:]).max(axis=1) / _PROBES
+        levels = np.clip(np.ceil(np.log2(np.maximum(texels_apart, 1.0))), 0, MAX_LEVELS - 1).astype(np.int64)
+        for level in np.unique(levels):
+            a, b, c = uvs[levels == level].transpose(1, 0, 2)
+            probes = [(1 - s - t) * a + s * b + t * c for s, t in _STRATA]
+            colors = [sample_bilinear(compiled.textures, int(index), probe, int(level)) for probe in probes]
+            radiance[chosen[levels == level]] *= np.average(colors, axis=0, weights=_SHARES)
     return radiance

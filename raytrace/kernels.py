@@ -63,6 +63,8 @@ class Tables(NamedTuple):
     light_pdf: Any
     light_density: Any
     sky: Any
+    far: Any
+    """Length of a shadow ray to the sky: out of the scene from anywhere in it, in its own units."""
     prev_triangles: Any
     static_count: int
 
@@ -94,6 +96,7 @@ def tables_of(scene: CompiledScene) -> Tables:
         lights.pdf,
         lights.density,
         lights.sky,
+        np.float32(max(1e8, 8.0 * scene.extent)),
         scene.prev_triangles,
         scene.static_count,
     )
@@ -160,7 +163,7 @@ def _light_sample(textured, has_sky, tables, px, py, pz, nx, ny, nz, gx, gy, gz,
             return _ZERO, _ZERO, _ZERO, _ZERO, _ZERO, _ZERO
         # Both techniques draw this direction with density cos/π: radiance·cos/π / (select·cos/π) · weight.
         scale = _ONE / (select + _ONE) if mis else _ONE / select
-        far = np.float32(1e8)  # in scene units: an unbounded ray, as a direction of finite length
+        far = tables.far
         return x * far, y * far, z * far, tables.sky[0] * scale, tables.sky[1] * scale, tables.sky[2] * scale
     triangle = tables.light_triangles[light]
     record = tables.triangles[triangle]
@@ -223,6 +226,16 @@ def _project(matrix, x, y, z):  # type: ignore[no-untyped-def]
     )
 
 
+@device
+def _project_direction(matrix, x, y, z):  # type: ignore[no-untyped-def]
+    """Clip-space x, y and w of the point at infinity in a direction: the camera's place does not enter."""
+    return (
+        matrix[0, 0] * x + matrix[0, 1] * y + matrix[0, 2] * z,
+        matrix[1, 0] * x + matrix[1, 1] * y + matrix[1, 2] * z,
+        matrix[3, 0] * x + matrix[3, 1] * y + matrix[3, 2] * z,
+    )
+
+
 class Outputs(NamedTuple):
     """Whole-frame images (N, C) float32 that the guide kernel writes at the pixels of its tile."""
 
@@ -268,12 +281,10 @@ def guide_kernel(variant: Variant, positions: bool) -> Callable[..., Any]:
                         out.emission[p, k] = tables.sky[k]
                 out.gradient[p, 0] = _ZERO
                 out.gradient[p, 1] = _ZERO
-                # The sky moves like points at infinity: w = 0 drops the camera's translation.
+                # The sky moves like points at infinity.
                 dx, dy, dz = directions[i, 0], directions[i, 1], directions[i, 2]
-                ax, ay, aw = _project(matrix, dx, dy, dz)
-                bx, by, bw = _project(prev_matrix, dx, dy, dz)
-                ax, ay, aw = ax - matrix[0, 3], ay - matrix[1, 3], aw - matrix[3, 3]
-                bx, by, bw = bx - prev_matrix[0, 3], by - prev_matrix[1, 3], bw - prev_matrix[3, 3]
+                ax, ay, aw = _project_direction(matrix, dx, dy, dz)
+                bx, by, bw = _project_direction(prev_matrix, dx, dy, dz)
                 out.motion[p, 0] = _HALF * (bx / bw - ax / aw) if bw > _ZERO else np.float32(2.0)
                 out.motion[p, 1] = _HALF * (by / bw - ay / aw) if bw > _ZERO else np.float32(2.0)
                 out.motion[p, 2] = _ZERO

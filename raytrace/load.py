@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from errors import Notices, UserError, did_you_mean
 from raytrace.camera import Camera
 from raytrace.gltf import load_gltf
+from raytrace.lamps import has_lamp, with_front_lamps
 from raytrace.obj import load_obj
 from raytrace.parts import Model
 from raytrace.ply import load_ply
 from raytrace.scene import Scene
-from raytrace.textures import SRGB_TO_LINEAR
 
 _READERS: dict[str, Callable[[Path, Notices], Model]] = {
     ".glb": load_gltf,
@@ -31,7 +31,6 @@ FORMATS = tuple(_READERS)
 _FRAMING_DIRECTION = (0.62, 0.42, 0.66)  # from the middle of the scene to the camera: a three-quarter view from above
 _FRAMING_FOV_DEGREES = 45.0
 _MARGIN = 1.02
-_GLOW = 0.01  # mean of an emissive texture, in linear light, below which it is a glow on an object and not a lamp
 
 
 def load_scene(path: str | Path) -> Scene:
@@ -61,6 +60,7 @@ def load_scene(path: str | Path) -> Scene:
     if not has_lamp(scene):
         notices.add("no light in the file: a constant white sky is added")
         sky = (1.0, 1.0, 1.0)
+    scene = with_front_lamps(scene, notices)
     return replace(scene, camera=camera, sky=sky, notices=tuple(notices.lines))
 
 
@@ -92,16 +92,3 @@ def framed(scene: Scene) -> Camera:
         return float(v[0]), float(v[1]), float(v[2])
 
     return Camera.look_at(triple(eye), triple(centre), yfov_degrees=_FRAMING_FOV_DEGREES)
-
-
-def has_lamp(scene: Scene) -> bool:
-    """Whether any triangle gives light to speak of: a logo that glows through an emissive texture lights no scene."""
-    used = {int(m) for mesh in scene.meshes for m in np.flatnonzero(np.bincount(mesh.materials))}
-    for material in (scene.materials[index] for index in used):
-        if material.emits:
-            if material.emission_texture < 0:
-                return True
-            pixels = scene.textures[material.emission_texture].pixels
-            if float(SRGB_TO_LINEAR[pixels].mean()) >= _GLOW:
-                return True
-    return False

@@ -106,7 +106,7 @@ class Scene:
         """Lower and upper corner of everything at time 0, each (3,) float64, world space."""
         lower, upper = np.full(3, np.inf), np.full(3, -np.inf)
         for mesh in self.meshes:
-            points = mesh.vertices[np.unique(mesh.faces)]
+            points = mesh.vertices[mesh.faces.reshape(-1)]  # vertices that no triangle uses do not count
             if mesh.motion is not None:
                 matrix = mesh.motion(0.0)
                 points = points @ matrix[:3, :3].T + matrix[:3, 3]

@@ -26,6 +26,7 @@ MAX_LEVELS = 15
 
 _ONE = np.float32(1.0)
 _HALF = np.float32(0.5)
+_COARSEST = np.float32(MAX_LEVELS - 1)
 
 
 @dataclass(frozen=True)
@@ -75,9 +76,9 @@ def build_atlas(textures: Sequence[Texture]) -> TextureAtlas:
     return TextureAtlas(texels, levels)
 
 
-def sample_bilinear(atlas: TextureAtlas, index: int, uvs: F64) -> F64:
-    """Finest level at ``uvs`` (n, 2), bilinear and repeated: (n, 3) float64, linear. The NumPy twin of `lookup`."""
-    offset, width, height = (int(v) for v in atlas.levels[index, 0])
+def sample_bilinear(atlas: TextureAtlas, index: int, uvs: F64, level: int = 0) -> F64:
+    """A level at ``uvs`` (n, 2), bilinear and repeated: (n, 3) float64, linear. The NumPy twin of `lookup`."""
+    offset, width, height = (int(v) for v in atlas.levels[index, level])
     image = SRGB_TO_LINEAR[atlas.texels[offset : offset + width * height]].reshape(height, width, 3).astype(np.float64)
     x, y = uvs[:, 0] * width - 0.5, uvs[:, 1] * height - 0.5
     x0, y0 = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
@@ -94,7 +95,7 @@ def level_for(footprint_texels):  # type: ignore[no-untyped-def]
     """Mip level whose texel is nearest in size to ``footprint_texels`` (level-0 texels)."""
     if not footprint_texels > _ONE:
         return 0
-    return min(int(math.log2(footprint_texels) + _HALF), MAX_LEVELS - 1)
+    return int(min(math.log2(footprint_texels) + _HALF, _COARSEST))  # infinity has no integer: limit first
 
 
 @device

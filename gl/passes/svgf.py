@@ -8,6 +8,11 @@ Deviations from the paper:
   implementations do; the paper gives no factor.
 * The denominator of the depth weight has a floor of a tenth of a pixel's width per pixel of distance: with the paper's
   constant a surface facing the camera, whose depth gradient is 0, would not be filtered at all.
+* Two parameters correct the paper's use of the variance, and are neutral in the preset ``paper``. It steers every
+  iteration by the variance of one sample although the colour is a mean of many: ``accumulated_variance`` scales it down
+  after the first iteration. Before that, inside the feedback loop, a tight luminance weight makes pixels shun the rare
+  bright samples of their neighbours frame after frame, and the picture darkens (1.7 % on the back wall of the Cornell
+  box): ``first_sigma_l`` loosens it there.
 * What travels between the iterations is the standard deviation, since a variance leaves the range of half precision.
 """
 
@@ -39,13 +44,15 @@ class Atrous(FragmentPass):
     in_color = In("rgb: irradiance; a: standard deviation of its luminance")
     in_surface = In("xyz: shading normal, world; w: depth, scene units")
     in_gradient = In("depth change per pixel, scene units")
+    in_reprojection = In(REPROJECTION, optional=True)
     out_color = Out("rgba16f", "filtered: rgb: irradiance; a: standard deviation of its luminance")
+    u_accumulated_variance = Uniform("float", "[0;1] variance of the accumulated colour in variances of one sample")
     u_sigma_z = Uniform("float", "> 0, depth edge-stopping")
     u_sigma_n = Uniform("float", "> 0, exponent of the normals' cosine")
     u_sigma_l = Uniform("float", "> 0, luminance edge-stopping in standard deviations")
     u_pixel_size = Uniform("float", "> 0, scene units a pixel is wide at depth 1")
 
-    def __init__(self, p: Svgf, step: int, pixel_size: float) -> None:
+    def __init__(self, p: Svgf, step: int, pixel_size: float, raw: bool = False) -> None:
         # A power of two is squared into place: pow() costs more than seven products.
         squarings = p.sigma_n.bit_length() - 1
         super().__init__(
@@ -53,10 +60,12 @@ class Atrous(FragmentPass):
                 "STEP": step,
                 "SIGMA_N_SQUARINGS": squarings if p.sigma_n == 1 << squarings else -1,
                 "LUMINANCE_STOP": int(p.variance_guided),
+                "RAW": int(raw),
             },
+            u_accumulated_variance=p.alpha / (2.0 - p.alpha),
             u_sigma_z=p.sigma_z,
             u_sigma_n=float(p.sigma_n),
-            u_sigma_l=p.sigma_l,
+            u_sigma_l=p.sigma_l * (p.first_sigma_l if step == 1 else 1.0),
             u_pixel_size=pixel_size,
         )
 
@@ -65,9 +74,9 @@ def svgf(g: Graph, signals: dict[str, Tex], guides: Guides, p: Svgf, pixel_size:
     """Filter each of ``signals`` (noisy irradiance by name, "direct", "indirect" or "both"); returns the clean ones.
 
     All of them share one reprojection. Histories are named by the set of signals, so that filtering them together
-    after filtering them apart begins with a new history, as it must.
+    after filtering them apart begins with a new history, as it must; and by whether the signals hold the albedo.
     """
-    names = "svgf." + "+".join(signals)
+    names = "svgf." + "+".join(signals) + ("" if p.demodulate else ".radiance")
     with g.scope("svgf"):
         found = reproject(g, guides, names, p, pixel_size) if p.temporal else None
         clean: dict[str, Tex] = {}
@@ -88,18 +97,18 @@ def _filter_signal(
         x, moments = accumulate(g, x, reprojection, history, p)
         estimate = {"in_moments": moments, "in_reprojection": reprojection}
     # Without time there is no other variance than the one in space; without guidance by variance there is none at all.
+    shape = {"in_surface": guides.surface, "in_gradient": guides.gradient}
     if p.variance_guided:
         stage = Variance(u_sigma_z=p.sigma_z, u_pixel_size=pixel_size)
-        shape = {"in_surface": guides.surface, "in_gradient": guides.gradient}
         unfiltered, x = x, g.add(stage, in_color=x, **shape, **estimate).out_color
     else:
         unfiltered = x
     if history is not None and p.feedback < 0:
         g.feed(history, unfiltered)
     for i in range(p.iterations):
-        x = g.add(
-            Atrous(p, 1 << i, pixel_size), f"atrous{i}", in_color=x, in_surface=guides.surface, in_gradient=guides.gradient
-        ).out_color
+        length = {"in_reprojection": reprojection} if reprojection and i == 0 and p.accumulated_variance else {}
+        iteration = Atrous(p, 1 << i, pixel_size, raw=x is noisy)
+        x = g.add(iteration, f"atrous{i}", in_color=x, **shape, **length).out_color
         if history is not None and i == p.feedback:
             g.feed(history, x)  # no copy: x is written into the history's other half
     return x

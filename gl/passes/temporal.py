@@ -109,7 +109,12 @@ def accumulate(
     """Add the accumulation of one signal into ``history``, which the caller feeds; returns colour and moments."""
     moments = g.history(f"{history.name}.moments", "rg32f")
     blended = g.add(
-        Accumulate(u_alpha=p.alpha, u_alpha_moments=p.alpha_moments, formats={"out_color": fmt}),
+        Accumulate(
+            u_alpha=p.alpha,
+            u_alpha_moments=p.alpha_moments,
+            formats={"out_color": fmt},
+            defines={"HALF": int(fmt == "rgba16f")},
+        ),
         in_color=color,
         in_reprojection=reprojection,
         prev_color=history,

@@ -26,9 +26,7 @@ def stage(ctx: moderngl.Context, tmp_path: Path) -> Iterator[Stage]:
 
 
 @pytest.fixture(scope="session")
-def _session_bench(
-    _session_context: moderngl.Context, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[Bench]:
+def _session_bench(_session_context: moderngl.Context, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
     with _session_context:
         bench = Bench(_session_context, tmp_path_factory.mktemp("shaders"))
         yield bench

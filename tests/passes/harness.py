@@ -11,10 +11,11 @@ import moderngl
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from config import Config, Svgf
+from config import Config, Svgf, Taa, load
 from gl.executor import SHADER_ROOT, Executor, Result
 from gl.graph import ComputePass, FragmentPass, Graph, In, Out, Tex
 from gl.passes.svgf import Atrous, Variance
+from gl.passes.taa import taa
 from gl.passes.temporal import Guides, accumulate, reproject
 from gl.pipelines import FrameTraits, build
 from gl.renderer import read
@@ -26,15 +27,17 @@ Size = tuple[int, int]
 
 DEPTH = 4.0
 PIXEL_SIZE = 0.02
+PAPER = load(None, ("svgf.preset=paper",)).svgf
 HALF = 2.0**-11
 """Largest relative error of one rounding to half precision."""
 
-SIZES: tuple[Size, ...] = ((64, 48), (31, 33), (1, 1), (1, 9), (9, 1))
-"""Width and height: ordinary, odd, and too small for any filter's window."""
+SIZES: tuple[Size, ...] = ((60, 44), (31, 33), (1, 1), (1, 9), (9, 1))
+"""Width and height: ordinary, odd, and too small for any filter's window. Elsewhere too no side is a power of two:
+llvmpipe compiles every shader anew for each combination of such sides."""
 
 
 def frame(
-    size: Size = (16, 12),
+    size: Size = (18, 12),
     *,
     direct: ArrayLike = 0.0,
     indirect: ArrayLike = 0.0,
@@ -87,18 +90,41 @@ def frame(
 
 def with_sky(packet: FramePacket, sky: NDArray[np.bool_]) -> FramePacket:
     """``packet`` with misses where ``sky`` (H, W) is set, as the tracer writes them."""
-    images = {
-        name: np.where(sky[..., None], np.float32(0.0), getattr(packet, name))
-        for name in ("direct", "indirect", "albedo", "surface", "gradient", "motion")
-    }
-    images["motion"][sky, 3] = MISS
-    return replace(packet, **images)
+
+    def cleared(values: F32) -> F32:
+        return np.where(sky[..., None], np.float32(0.0), values)
+
+    motion = packet.motion.copy()
+    motion[sky, 2:] = 0.0, MISS
+    return replace(
+        packet,
+        direct=cleared(packet.direct),
+        indirect=cleared(packet.indirect),
+        albedo=cleared(packet.albedo),
+        surface=cleared(packet.surface),
+        gradient=cleared(packet.gradient),
+        motion=motion,
+    )
 
 
 def noise(size: Size, seed: int, mean: float = 1.0) -> F32:
     """(H, W, 3) grey noise of one path per pixel: a few bright samples among dark ones. Its variance is mean²."""
     values = np.random.default_rng(seed).exponential(mean, (size[1], size[0], 1))
     return np.repeat(values, 3, axis=2).astype(np.float32)
+
+
+def signal(size: Size, color: ArrayLike, sigma: ArrayLike = 0.0) -> dict[str, F32]:
+    """Upload for :func:`atrous` and :func:`variance`: grey or (H, W, 3) ``color`` and its standard deviation."""
+    height, width = size[1], size[0]
+    values = np.asarray(color, np.float32)
+    values = np.broadcast_to(values[..., None] if values.shape in ((), (height, width)) else values, (height, width, 3))
+    deviation = np.broadcast_to(np.asarray(sigma, np.float32), (height, width))
+    return {"frame.signal": np.concatenate([values, deviation[..., None]], axis=2)}
+
+
+def columns(size: Size, values: ArrayLike) -> NDArray[np.float64]:
+    """(H, W) from one value for each column."""
+    return np.broadcast_to(np.asarray(values, np.float64), (size[1], size[0])).copy()
 
 
 class Poison(FragmentPass):
@@ -250,4 +276,11 @@ def variance(p: Svgf | None = None, *, temporal: bool = False, pixel_size: float
         }
     work = Variance(u_sigma_z=(p or Svgf()).sigma_z, u_pixel_size=pixel_size, formats={"out_color": "rgba32f"})
     g.output("color", g.add(work, in_color=g.import_("frame.signal", "rgba32f"), **_shape(g), **optional).out_color)
+    return g
+
+
+def anti_aliasing(p: Taa | None = None) -> Graph:
+    """TAA of ``frame.color`` (rgb, tone-mapped); output ``color``."""
+    g = Graph()
+    g.output("color", taa(g, g.import_("frame.color", "rgba32f"), Guides(g, False), p or Taa(), "test"))
     return g

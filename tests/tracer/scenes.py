@@ -50,11 +50,13 @@ def box(lower: Point, upper: Point, inward: bool = False) -> F64:
 def sphere(radius: float = 1.0, centre: Point = (0.0, 0.0, 0.0), splits: int = 2, inward: bool = False) -> F64:
     """An icosahedron split ``splits`` times, corners on the sphere: 20 * 4^splits triangles."""
     g = (1.0 + math.sqrt(5.0)) / 2.0
-    corners = np.array([(0, s, t * g) for s in (-1, 1) for t in (-1, 1)], dtype=np.float64)
-    points = np.concatenate([np.roll(corners, k, axis=1) for k in range(3)])
+    golden = np.array([(0, s, t * g) for s in (-1, 1) for t in (-1, 1)], dtype=np.float64)
+    points = np.concatenate([np.roll(golden, k, axis=1) for k in range(3)])
     edge = 2.0 * (1.0 + 1e-9)
     near = np.linalg.norm(points[:, None] - points[None], axis=2) <= edge
-    indices = [(i, j, k) for i in range(12) for j in range(i) for k in range(j) if near[i, j] and near[j, k] and near[i, k]]
+    indices = [
+        (i, j, k) for i in range(12) for j in range(i) for k in range(j) if near[i, j] and near[j, k] and near[i, k]
+    ]
     triangles = points[np.array(indices)]
     turned = np.linalg.det(triangles) < 0.0
     triangles[turned] = triangles[turned][:, ::-1]
@@ -64,8 +66,9 @@ def sphere(radius: float = 1.0, centre: Point = (0.0, 0.0, 0.0), splits: int = 2
         parts = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
         triangles = np.concatenate([np.stack(part, axis=1) for part in parts])
         triangles /= np.linalg.norm(triangles, axis=2, keepdims=True)
-    triangles = triangles / np.linalg.norm(triangles, axis=2, keepdims=True) * radius + np.array(centre)
-    return triangles[:, ::-1] if inward else triangles
+    unit: F64 = triangles / np.linalg.norm(triangles, axis=2, keepdims=True)
+    corners: F64 = unit * radius + np.array(centre)
+    return corners[:, ::-1] if inward else corners
 
 
 def mesh(
@@ -141,7 +144,11 @@ def placed_camera(camera: Camera, scale: float, offset: Point) -> Camera:
 
 def cornell(motion: Motion | None = None, sky: Point | None = None) -> Scene:
     """A Cornell-like box of side 2 open towards +z, two blocks, a one-sided lamp; one block has ``motion``."""
-    white, red, green = Material("white", (0.7, 0.7, 0.7)), Material("red", (0.6, 0.1, 0.1)), Material("green", (0.1, 0.5, 0.1))
+    white, red, green = (
+        Material("white", (0.7, 0.7, 0.7)),
+        Material("red", (0.6, 0.1, 0.1)),
+        Material("green", (0.1, 0.5, 0.1)),
+    )
     lamp = Material("lamp", (0.5, 0.5, 0.5), emission=(8.0, 6.0, 3.0))
     room = np.concatenate(
         [
@@ -154,8 +161,8 @@ def cornell(motion: Motion | None = None, sky: Point | None = None) -> Scene:
         mesh("room", room, 0),
         mesh("left", quad((-1, -1, 1), (-1, -1, -1), (-1, 1, -1), (-1, 1, 1)), 1),
         mesh("right", quad((1, -1, -1), (1, -1, 1), (1, 1, 1), (1, 1, -1)), 2),
-        mesh("tall", box((-0.6, -1, -0.6), (-0.1, 0.2, -0.1)), 0),
-        mesh("short", box((0.2, -1, 0.0), (0.7, -0.5, 0.5)), 0, motion=motion),
+        mesh("tall", box((-0.6, -0.999, -0.6), (-0.1, 0.2, -0.1)), 0),
+        mesh("short", box((0.2, -0.999, 0.0), (0.7, -0.5, 0.5)), 0, motion=motion),
         mesh("lamp", quad((-0.4, 0.9, -0.4), (0.4, 0.9, -0.4), (0.4, 0.9, 0.4), (-0.4, 0.9, 0.4)), 3),
     ]
     camera = Camera.look_at((0.1, 0.05, 3.6), (0.0, 0.0, 0.0), yfov_degrees=42.0)
@@ -185,7 +192,9 @@ def everything() -> Scene:
             1,
             motion=rigid((0.3, 1.0, 0.2), 1.5, (0.4, 0.1, -0.2), pivot=(-0.7, 0.4, 0.0)),
         ),
-        mesh("lamp", quad((-0.3, 1.8, -0.3), (0.3, 1.8, -0.3), (0.3, 1.8, 0.3), (-0.3, 1.8, 0.3)), 2, uvs=square_uvs / 4),
+        mesh(
+            "lamp", quad((-0.3, 1.8, -0.3), (0.3, 1.8, -0.3), (0.3, 1.8, 0.3), (-0.3, 1.8, 0.3)), 2, uvs=square_uvs / 4
+        ),
     ]
     camera = Camera.look_at((0.4, 1.3, 3.4), (0.0, 0.6, 0.0), yfov_degrees=50.0)
     textures = (Texture("tiles", pixels), Texture("glow", glow))
@@ -211,9 +220,14 @@ def view_of(t: Tracer, camera: Camera, size: tuple[int, int]) -> View:
     return View.of(camera, size, t.scene.origin)
 
 
+def selected(hits: Hits, indices: NDArray[np.integer]) -> Hits:
+    """Those of ``hits``, in that order."""
+    return Hits(hits.triangle[indices], hits.u[indices], hits.v[indices], hits.object[indices])
+
+
 def repeated(hits: Hits, chosen: int, count: int) -> Hits:
     """One of ``hits``, ``count`` times."""
-    return Hits(*(np.repeat(part[chosen : chosen + 1], count) for part in (hits.triangle, hits.u, hits.v, hits.object)))
+    return selected(hits, np.full(count, chosen))
 
 
 def shade(t: Tracer, hits: Hits, seeds: Seeds, eye: F32) -> tuple[F32, F32]:
@@ -245,7 +259,7 @@ def light_at(t: Tracer, target: Point, eye: Point, count: int, frame: int = 0) -
 
 
 def points_of(what: Scene, hits: Hits, time: float = 0.0) -> F64:
-    """Hits in world space from the scene's own vertices in float64, (n, 3); NaN for a miss. Static meshes come first."""
+    """Hits in world space from the scene's own vertices in float64, (n, 3); NaN for a miss."""
     corners = ordered_triangles(what, time)[hits.triangle]
     u, v = hits.u.astype(np.float64)[:, None], hits.v.astype(np.float64)[:, None]
     points: F64 = (1 - u - v) * corners[:, 0] + u * corners[:, 1] + v * corners[:, 2]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 F64 = NDArray[np.float64]
 
 SIGNIFICANCE = 1e-3
-"""Chance that a right implementation fails one comparison, all of its numbers together. Seeds are fixed: it cannot flake."""
+"""Chance that a right tracer fails one comparison, all of its numbers together. Seeds are fixed: no test can flake."""
 
 
 @dataclass(frozen=True)

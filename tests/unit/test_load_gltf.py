@@ -4,22 +4,23 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from raytrace.load import load_scene
+from raytrace.parts import normalized
 from raytrace.scene import Mesh, Scene
 from tests.unit.gltf_files import TRIANGLE, GltfBuilder, one_triangle
 
 CORNERS = np.array(TRIANGLE)
 
 
-def _face_normals(mesh: Mesh) -> np.ndarray[Any, Any]:
+def _face_normals(mesh: Mesh) -> NDArray[np.float64]:
     a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
     n = np.cross(b - a, c - a)
-    return n / np.linalg.norm(n, axis=1, keepdims=True)
+    return normalized(n)
 
 
 def _notice(scene: Scene, *words: str) -> str:
@@ -50,7 +51,7 @@ def test_every_primitive_keeps_its_own_geometry_and_material(tmp_path: Path):
         builder.mesh(
             *(
                 builder.primitive(
-                    CORNERS + (10 * m, k, 0), normals=[(0, 0, 1)] * 3 if k == 0 else None, material=2 * m + k
+                    np.add(CORNERS, (10 * m, k, 0)), normals=[(0, 0, 1)] * 3 if k == 0 else None, material=2 * m + k
                 )
                 for k in range(2)
             ),
@@ -59,13 +60,13 @@ def test_every_primitive_keeps_its_own_geometry_and_material(tmp_path: Path):
         )
         for m in range(2)
     ]
-    for mesh, z in ((meshes[1], 0.0), (meshes[0], 100.0), (meshes[1], 200.0)):
-        builder.node(mesh=mesh, translation=[0, 0, z], name="same")
+    for number, z in ((meshes[1], 0.0), (meshes[0], 100.0), (meshes[1], 200.0)):
+        builder.node(mesh=number, translation=[0, 0, z], name="same")
     scene = load_scene(builder.write_glb(tmp_path / "a.glb"))
     assert [len(mesh.faces) for mesh in scene.meshes] == [2, 2, 2]
     for mesh, m, z in zip(scene.meshes, (1, 0, 1), (0.0, 100.0, 200.0), strict=True):
         for k in range(2):
-            np.testing.assert_array_equal(mesh.vertices[mesh.faces[k]], CORNERS + (10 * m, k, z))
+            np.testing.assert_array_equal(mesh.vertices[mesh.faces[k]], np.add(CORNERS, (10 * m, k, z)))
             assert scene.materials[mesh.materials[k]].base_color[0] == (2 * m + k) / 4
         assert mesh.normals is not None  # a flat primitive in an object with a smooth one gets its own normals
         np.testing.assert_allclose(mesh.normals, [(0, 0, 1)] * 6)
@@ -82,7 +83,7 @@ def test_no_normals_means_flat_shading(tmp_path: Path):
 @pytest.mark.parametrize("scale", [(1, 1, 1), (2, 1, 0.5), (-1, 1, 1), (-3, -1, -0.1), (1e-4, 1e-4, -1e-4)])
 def test_transforms_keep_normals_outside(tmp_path: Path, scale: tuple[float, float, float]):
     """A slanted triangle under rotation, non-uniform scale and mirroring, against its own plane."""
-    slanted = np.array([(1.0, 0.2, 0.1), (0.3, 1.0, 0.4), (0.1, 0.5, 1.5)])
+    slanted = np.array([(1.0, 0.25, 0.125), (0.375, 1.0, 0.5), (0.125, 0.5, 1.5)])
     normal = np.cross(slanted[1] - slanted[0], slanted[2] - slanted[0])
     normal /= np.linalg.norm(normal)
     angle = 0.7
@@ -101,8 +102,8 @@ def test_transforms_keep_normals_outside(tmp_path: Path, scale: tuple[float, flo
     np.testing.assert_allclose(np.linalg.norm(mesh.normals, axis=1), 1.0, atol=1e-6)
     # The side that was the front stays the front: winding and vertex normals agree, and both follow the plane.
     np.testing.assert_allclose(mesh.normals[0], _face_normals(mesh)[0], atol=1e-5)
-    outside = np.sign(scale) * np.array(normal) @ rotation.T
-    assert _face_normals(mesh)[0] @ outside > 0
+    outside = (normal / scale) @ rotation.T
+    np.testing.assert_allclose(mesh.normals[0], outside / np.linalg.norm(outside), atol=1e-5)
 
 
 def test_matrix_nodes_are_column_major_and_compose(tmp_path: Path):
@@ -155,6 +156,7 @@ def test_strips_interleaved_and_quantized_data(tmp_path: Path):
     np.testing.assert_allclose(_face_normals(strip), [(0, 0, 1)] * 2)
     for mesh in (interleaved, quantized):
         np.testing.assert_array_equal(mesh.vertices[mesh.faces[0]], CORNERS)
+        assert mesh.normals is not None
         np.testing.assert_allclose(mesh.normals, [(0, 0, 1)] * 3)
 
 

@@ -86,7 +86,7 @@ def test_second_coordinate_set_and_transform(tmp_path: Path):
     builder.json["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_1"] = builder.accessor(corners)
     mesh = _load(builder, tmp_path).meshes[0]
     assert mesh.uvs is not None
-    # Image's lower left quadrant, from below: (0, 0) to (0.5, 0.5). The unit square's upper left goes to the lower left.
+    # The unit square's upper left corner goes to the image's lower left one, and the quadrant ends at (0.5, 0.5).
     np.testing.assert_allclose(mesh.uvs[mesh.faces[0]], [(0, 0), (0, 0.5), (0.5, 0)], atol=1e-6)
 
 

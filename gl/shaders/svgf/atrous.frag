@@ -1,8 +1,8 @@
 // One iteration of the edge-avoiding à-trous wavelet. Dammertz et al. 2010; Schied et al. 2017, sec. 4.3 and 4.4.
 //
 // STEP: distance of the taps. SIGMA_N_SQUARINGS: log2 of the normal exponent, or -1 where it is no power of two.
-// LUMINANCE_STOP: 0 leaves out w_l. The taps are written out: constants then fold, and a software rasteriser takes 0.6 of
-// the time of a loop.
+// LUMINANCE_STOP: 0 leaves out w_l. RAW: in_color is a sample that no pass has looked at yet.
+// The taps are written out: constants then fold, and a software rasteriser takes 0.6 of the time of a loop.
 
 #include "common/color.glsl"
 #include "common/finite.glsl"
@@ -10,6 +10,10 @@
 uniform sampler2D in_color;   // rgb irradiance, standard deviation of its luminance
 uniform sampler2D in_surface; // normal, depth
 uniform sampler2D in_gradient;
+#if HAS_IN_REPROJECTION
+uniform sampler2D in_reprojection; // w: history length before this frame
+#endif
+uniform float u_accumulated_variance;
 uniform float u_sigma_z;
 uniform float u_sigma_n;
 uniform float u_sigma_l;
@@ -26,6 +30,14 @@ float l, inverse_l, floor_z;
 vec3 color;
 float weight, variance;
 
+vec4 color_at(ivec2 q) {
+    vec4 c = texelFetch(in_color, q, 0);
+#if RAW
+    c = is_finite(c.rgb) ? vec4(clamp_radiance(c.rgb), 0.0) : vec4(0.0);
+#endif
+    return c;
+}
+
 float normal_weight(vec3 n) {
     float w = max(dot(surface.xyz, n), 0.0);
 #if SIGMA_N_SQUARINGS >= 0
@@ -40,14 +52,14 @@ void tap(ivec2 offset, float kernel, float inverse_z) {
     ivec2 q = p + offset;
     bool inside = all(lessThan(uvec2(q), uvec2(size)));
     q = clamp(q, ivec2(0), size - 1);
-    vec4 c = texelFetch(in_color, q, 0);
+    vec4 c = color_at(q);
     vec4 s = texelFetch(in_surface, q, 0);
     float e = abs(surface.w - s.w) * inverse_z;
 #if LUMINANCE_STOP
     e += abs(l - luminance(c.rgb)) * inverse_l;
 #endif
     float w = kernel * normal_weight(s.xyz) * exp2(-e);
-    w = inside ? w : 0.0;
+    w = inside ? sane_weight(w) : 0.0;
     color += w * c.rgb;
     variance += (w * c.a) * (w * c.a);
     weight += w;
@@ -66,7 +78,7 @@ void pair(int dx, int dy, float kernel) {
 void main() {
     p = ivec2(gl_FragCoord.xy);
     size = textureSize(in_color, 0);
-    vec4 centre = texelFetch(in_color, p, 0);
+    vec4 centre = color_at(p);
     surface = texelFetch(in_surface, p, 0);
     gradient = texelFetch(in_gradient, p, 0).xy;
     floor_z = 0.1 * u_pixel_size * surface.w;
@@ -77,7 +89,7 @@ void main() {
     float blurred = 0.0;
     for (int y = -1; y <= 1; ++y)
         for (int x = -1; x <= 1; ++x) {
-            float sigma = texelFetch(in_color, clamp(p + ivec2(x, y), ivec2(0), size - 1), 0).a;
+            float sigma = color_at(clamp(p + ivec2(x, y), ivec2(0), size - 1)).a;
             blurred += sigma * sigma * (x == 0 ? 0.5 : 0.25) * (y == 0 ? 0.5 : 0.25);
         }
     inverse_l = LOG2_E / (u_sigma_l * sqrt(blurred) + 1e-6);
@@ -95,6 +107,11 @@ void main() {
     pair(1, 2, A * B);  pair(1, -2, A * B);
     pair(2, 2, B * B);  pair(2, -2, B * B);
 
+#if HAS_IN_REPROJECTION
+    // From here on the variance is that of the accumulated colour: 1/h of one sample's while the mean is a plain one.
+    float h = texelFetch(in_reprojection, p, 0).w + 1.0;
+    variance *= max(1.0 / h, u_accumulated_variance);
+#endif
     // Var = Σ w² var / (Σ w)²: the standard deviation is what half precision can hold.
-    out_color = vec4(color / weight, min(sqrt(variance) / weight, HALF_LIMIT));
+    out_color = round_to_half(vec4(color / weight, min(sqrt(variance) / weight, HALF_LIMIT)));
 }

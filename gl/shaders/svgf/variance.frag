@@ -53,7 +53,7 @@ void main() {
         float n = max(dot(surface.xyz, s.xyz), 0.0);
         n *= n; n *= n; n *= n; n *= n; n *= n; n *= n; n *= n; // ^128
         float range = u_sigma_z * abs(dot(gradient, vec2(d))) + floor_z * length(vec2(d)) + 1e-30;
-        float w = n * exp(-abs(surface.w - s.w) / range);
+        float w = sane_weight(n * exp(-abs(surface.w - s.w) / range));
         sum += w * vec3(moments_at(q), 1.0);
     }
     if (last >= 0 && sum.z > 0.0) {
@@ -62,5 +62,5 @@ void main() {
         float variance = max(m.y - m.x * m.x, 0.0) * MIN_HISTORY / h;
         color.a = min(sqrt(variance), HALF_LIMIT);
     }
-    out_color = color;
+    out_color = round_to_half(color);
 }

@@ -29,7 +29,7 @@ vec3 history_at(vec2 lattice) {
             ivec2 q = clamp(ivec2(base) + ivec2(x - 1, y - 1), ivec2(0), size - 1);
             sum += w[x].x * w[y].y * texelFetch(prev_color, q, 0).rgb;
         }
-    return max(sum, vec3(0.0)); // the negative lobes ring below zero
+    return sum;
 }
 
 // Where the way from the box's mean to the history leaves the box.
@@ -73,12 +73,13 @@ void main() {
     vec2 lattice = vec2(p) + texelFetch(in_motion, nearest, 0).xy * vec2(size);
     bool on_screen = all(greaterThanEqual(lattice, vec2(-0.5))) && all(lessThan(lattice, vec2(size) - 0.5));
     vec3 history = on_screen ? history_at(lattice) : c;
-    history = is_finite(history) ? history : c;
+    history = is_finite(history) ? clamp_radiance(history) : c; // the spline rings below zero and above its values
 #if CLIP
     history = max(from_ycocg(clip_to_box(to_ycocg(history), mean, low, high)), vec3(0.0));
 #endif
     // Weights that fall with luminance keep one bright sample from flickering through the mean.
     float new_weight = u_alpha / (1.0 + luminance(c));
     float old_weight = (1.0 - u_alpha) / (1.0 + luminance(history));
-    out_color = vec4((new_weight * c + old_weight * history) / (new_weight + old_weight), 1.0);
+    c = (new_weight * c + old_weight * history) / (new_weight + old_weight);
+    out_color = round_to_half(vec4(c, 1.0));
 }

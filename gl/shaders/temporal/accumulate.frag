@@ -1,6 +1,6 @@
 // Blend this frame's sample with the history found by temporal/reproject.frag, and the luminance moments with it.
 //
-// Schied et al. 2017, sec. 4.1 and 4.2: C' = a·C + (1 - a)·C'_prev, moments likewise.
+// Schied et al. 2017, sec. 4.1 and 4.2: C' = a·C + (1 - a)·C'_prev, moments likewise. HALF: the colour's precision.
 
 #include "common/color.glsl"
 #include "common/finite.glsl"
@@ -63,5 +63,8 @@ void main() {
         m = usable ? mix(moments, m, max(share, u_alpha_moments)) : moments;
     }
     out_color = vec4(c, sqrt(max(m.y - m.x * m.x, 0.0))); // the difference may round below zero
+#if HALF
+    out_color = round_to_half(out_color);
+#endif
     out_moments = m;
 }

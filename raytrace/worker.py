@@ -1,0 +1,140 @@
+"""The tracer in a thread of its own, one frame ahead: it traces frame n + 1 while the GPU filters frame n."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from queue import Empty, SimpleQueue
+from typing import Protocol
+
+from raytrace.camera import Camera
+from raytrace.frame import FramePacket
+from raytrace.shot import jitter_of
+
+
+class FrameSource(Protocol):
+    """What the worker needs of :class:`raytrace.integrator.Tracer`."""
+
+    def frame(
+        self,
+        index: int,
+        camera: Camera,
+        previous_camera: Camera,
+        size: tuple[int, int],
+        now: float,
+        previous: float,
+        cut: bool,
+    ) -> FramePacket: ...
+
+
+@dataclass(frozen=True)
+class Request:
+    """What the next frame shows.
+
+    ``camera`` is without jitter, which ``jitter`` asks for. ``size``: (width, height) in pixels. ``time``: the scene's,
+    in seconds. ``cut``: the frame does not continue the one before it.
+    """
+
+    camera: Camera
+    size: tuple[int, int]
+    time: float = 0.0
+    jitter: bool = False
+    cut: bool = False
+
+
+class Worker:
+    """Hands requests in and packets out, one of either at a time::
+
+        worker.submit(request)
+        while True:
+            packet = worker.take(timeout=None)
+            worker.submit(next_request)  # traced while the caller works on `packet`
+            ...
+
+    Motion vectors lead to the frame traced before, whenever that was: its camera and time are remembered here. A frame
+    is marked as a cut if it is the first, differs in size from the one before, or is asked to be.
+
+    ``notify`` is called from the worker's thread whenever :meth:`take` has something to return; it must not raise.
+    All other methods belong to one thread. ``with Worker(...)`` or :meth:`close` ends the worker's thread.
+    """
+
+    def __init__(self, tracer: FrameSource, notify: Callable[[], None] | None = None) -> None:
+        self._tracer, self._notify = tracer, notify
+        self._requests: SimpleQueue[Request | None] = SimpleQueue()
+        self._outcomes: SimpleQueue[FramePacket | BaseException] = SimpleQueue()
+        self._busy = False
+        self._index = 0
+        self._last: Request | None = None
+        self._thread = threading.Thread(target=self._work, name="tracer")
+        self._thread.start()
+
+    def __enter__(self) -> Worker:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    @property
+    def busy(self) -> bool:
+        """Whether a frame was submitted and not yet taken."""
+        return self._busy
+
+    def submit(self, request: Request) -> None:
+        """Begin with the next frame.
+
+        Raises:
+            RuntimeError: the frame before has not been taken, or the worker is closed.
+        """
+        if self._busy or not self._thread.is_alive():
+            raise RuntimeError("a frame is under way: take it first" if self._busy else "the worker is closed")
+        self._busy = True
+        self._requests.put(request)
+
+    def take(self, timeout: float | None = 0.0) -> FramePacket | None:
+        """The frame submitted, or None if it is not ready within ``timeout`` seconds (None: wait for it).
+
+        Raises whatever went wrong while it was traced; the frame after that is a cut.
+
+        Raises:
+            RuntimeError: no frame was submitted.
+        """
+        if not self._busy:
+            raise RuntimeError("no frame is under way: submit one first")
+        try:
+            outcome = self._outcomes.get(block=timeout != 0.0, timeout=timeout)
+        except Empty:
+            return None
+        self._busy = False
+        if isinstance(outcome, BaseException):
+            raise outcome
+        return outcome
+
+    def close(self) -> None:
+        """End the thread; waits for the frame under way, which is lost. Closing twice does no harm."""
+        self._requests.put(None)
+        self._thread.join()
+        self._busy = False
+
+    def _work(self) -> None:
+        for request in iter(self._requests.get, None):
+            outcome: FramePacket | BaseException
+            try:
+                outcome = self._trace(request)
+            except BaseException as error:  # whatever it is, it is raised where the frame is waited for
+                outcome = error
+            self._outcomes.put(outcome)
+            if self._notify is not None:
+                self._notify()
+
+    def _trace(self, request: Request) -> FramePacket:
+        last, self._last = self._last, None  # stays None if tracing fails: what comes next continues nothing
+        cut = request.cut or last is None or last.size != request.size
+        before = request if cut or last is None else last
+        camera = request.camera.with_jitter(jitter_of(self._index)) if request.jitter else request.camera
+        packet = self._tracer.frame(
+            self._index, camera, before.camera, request.size, request.time, before.time, cut=cut
+        )
+        self._index += 1
+        self._last = request
+        return packet
