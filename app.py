@@ -48,14 +48,18 @@ class Parser(argparse.ArgumentParser):
 
 
 def _common(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--scene", default="cornell", metavar="S", help="cornell, interior, or a .glb .gltf .obj .ply file")
+    parser.add_argument(
+        "--scene", default="cornell", metavar="S", help="cornell, interior, or a .glb .gltf .obj .ply file"
+    )
     parser.add_argument("--size", metavar="WxH", help="pixels (default: config.toml, 640x360)")
     parser.add_argument("--seed", metavar="K", help="seed of all random numbers (default 0)")
     _settings(parser)
 
 
 def _settings(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--config", type=Path, default=ROOT / "config.toml", metavar="FILE", help="parameters (config.toml)")
+    parser.add_argument(
+        "--config", type=Path, default=ROOT / "config.toml", metavar="FILE", help="parameters (config.toml)"
+    )
     parser.add_argument(
         "--set", action="append", default=[], metavar="S.K=V", help="one parameter, as in svgf.iterations=3; repeatable"
     )
@@ -76,14 +80,22 @@ def build_parser() -> Parser:
     render = commands.add_parser("render", help="render one picture without a window")
     _common(render)
     render.add_argument("--denoiser", choices=DENOISERS, default="svgf", help="reconstruction (default svgf)")
-    render.add_argument("--frames", default="32", metavar="N", help="render frames 0 to N-1, write the last (default 32)")
+    render.add_argument(
+        "--frames", default="32", metavar="N", help="render frames 0 to N-1, write the last (default 32)"
+    )
     render.add_argument("--spp", metavar="M", help="paths per pixel of --denoiser reference (default: --frames)")
-    render.add_argument("--camera", default="still", metavar="C", help="still, flight, or a camera path in JSON (default still)")
+    render.add_argument(
+        "--camera", default="still", metavar="C", help="still, flight, or a camera path in JSON (default still)"
+    )
     render.add_argument("--animate", action="store_true", help="let objects and lamps move")
     render.add_argument("--jitter", action="store_true", help="sub-pixel camera jitter")
     render.add_argument("--out", type=Path, default=Path("out/shot.png"), metavar="PNG", help="default out/shot.png")
-    render.add_argument("--exr", action="store_true", help="linear radiance as EXR beside it, before anti-aliasing and tone map")
-    render.add_argument("--show", default="", metavar="NAME", help="write this texture of the graph instead of the picture")
+    render.add_argument(
+        "--exr", action="store_true", help="linear radiance as EXR beside it, before anti-aliasing and tone map"
+    )
+    render.add_argument(
+        "--show", default="", metavar="NAME", help="write this texture of the graph instead of the picture"
+    )
 
     graph = commands.add_parser("graph", help="print the passes of one frame")
     graph.add_argument("--denoiser", choices=DENOISERS, default="svgf")
@@ -94,8 +106,12 @@ def build_parser() -> Parser:
     bench = commands.add_parser("bench", help="measure time and error of the methods on the same frames")
     bench.add_argument("--table", action="store_true", help="print the table (default)")
     bench.add_argument("--scene", action="append", metavar="S", help="repeatable (default: cornell and interior)")
-    bench.add_argument("--quick", action="store_true", help="smaller pictures, fewer samples: does it run, not how fast")
-    bench.add_argument("--out", type=Path, default=Path("out/bench.json"), metavar="JSON", help="default out/bench.json")
+    bench.add_argument(
+        "--quick", action="store_true", help="smaller pictures, fewer samples: does it run, not how fast"
+    )
+    bench.add_argument(
+        "--out", type=Path, default=Path("out/bench.json"), metavar="JSON", help="default out/bench.json"
+    )
     bench.add_argument("--size", metavar="WxH", help="pixels (default 640x360)")
     _settings(bench)
 
@@ -148,7 +164,16 @@ def run(argv: Sequence[str]) -> int:
         jitter = args.jitter or config.render.jitter == "on"
         headless.render(
             headless.RenderJob(
-                args.scene, args.denoiser, frames, samples, args.camera, args.animate, jitter, args.out, args.exr, args.show
+                args.scene,
+                args.denoiser,
+                frames,
+                samples,
+                args.camera,
+                args.animate,
+                jitter,
+                args.out,
+                args.exr,
+                args.show,
             ),
             config,
         )

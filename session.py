@@ -41,7 +41,8 @@ def open_tracer(scene: Scene, config: Config, positions: bool = False) -> tuple[
     )
     tracer = Tracer(compiled, settings)
     late = threading.Timer(
-        1.0, lambda: print("compiling the tracer's kernels, once for each kind of scene ...", file=sys.stderr, flush=True)
+        1.0,
+        lambda: print("compiling the tracer's kernels, once for each kind of scene ...", file=sys.stderr, flush=True),
     )
     late.daemon = True
     late.start()

@@ -67,6 +67,9 @@ class Recorder(RayCaster):
         self._keep(len(origins), partial(self._caster.occluded, origins.copy(), directions.copy(), limits.copy()))
         return self._caster.occluded(origins, directions, limits)
 
+    def close(self) -> None:
+        self._caster.close()
+
     def _keep(self, rays: int, trace: Callable[[], object]) -> None:
         self._here.tile.append(Batch(rays, trace))
 

@@ -17,7 +17,7 @@ def create_headless() -> moderngl.Context:
         UserError: EGL is missing, no driver answers, or its OpenGL is older than 4.3.
     """
     try:
-        ctx = moderngl.create_context(standalone=True, backend="egl")  # type: ignore[call-arg]
+        ctx = moderngl.create_context(standalone=True, backend="egl")  # type: ignore[arg-type]  # its stub is wrong
     except Exception as error:  # glcontext raises bare Exception with the name of the EGL call that failed
         raise UserError(
             f"no headless OpenGL: {error}",

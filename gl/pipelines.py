@@ -28,7 +28,8 @@ DENOISERS = {
 class FrameTraits:
     """What the graph needs to know of a frame besides its textures.
 
-    ``moving``: objects move, so there is a ``frame.prev_normal``. ``pixel_size``: scene units a pixel is wide at depth 1.
+    ``moving``: objects move, so there is a ``frame.prev_normal``. ``pixel_size``: scene units a pixel is wide at depth
+    1.
     """
 
     moving: bool = False

@@ -33,8 +33,8 @@ class StopWatch(threading.local):
 class RayCaster(ABC):
     """Traces batches of rays against a scene's triangles. Safe to call from several threads at a time.
 
-    Triangles that never move live in one Embree scene, built once; those that move in a second one, small, rebuilt every
-    frame. A scene in which nothing moves builds and traces the first only.
+    Triangles that never move live in one Embree scene, built once; those that move in a second one, small, rebuilt
+    every frame. A scene in which nothing moves builds and traces the first only.
     """
 
     name: str
@@ -64,8 +64,9 @@ class RayCaster(ABC):
         ``limits`` (n,) float32 in units of the direction's length; the array may be used up.
         """
 
+    @abstractmethod
     def close(self) -> None:
-        """Give back what Embree holds."""
+        """Give back what Embree holds; rays cannot be traced afterwards."""
 
 
 @device

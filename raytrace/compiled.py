@@ -34,9 +34,9 @@ _OFFSET_SCALE = 2.0**-18
 class Lights:
     """Emissive triangles and the constant sky, chosen in proportion to their power.
 
-    ``triangles`` (L,) int32; ``threshold``, ``alias``, ``pdf`` the alias table over the L triangles, plus one last entry
-    for the sky where there is one. ``density`` (L,) float32: pdf per area of a point on the triangle. ``sky`` (3,)
-    float32.
+    ``triangles`` (L,) int32; ``threshold``, ``alias``, ``pdf`` the alias table over the L triangles, plus one last
+    entry for the sky where there is one. ``density`` (L,) float32: pdf per area of a point on the triangle.
+    ``sky`` (3,) float32.
     """
 
     triangles: I32
@@ -53,8 +53,9 @@ class CompiledScene:
     """``triangles`` (T, RECORD) float32, moving ones last: three corners, their three unit shading normals, the unit
     normal of the front face (counter-clockwise corners), and the ray offset.
 
-    ``triangle_info`` (T, 4) int32: material, object, light index or -1, 1 if the shading normals are the vertices'. ``triangle_uvs`` (T, 6) float32 and
-    ``uv_density`` (T,) float32, uv units per scene unit (both of length 1 where nothing is textured).
+    ``triangle_info`` (T, 4) int32: material, object, light index or -1, 1 if the shading normals are the vertices'.
+    ``triangle_uvs`` (T, 6) float32 and ``uv_density`` (T,) float32, uv units per scene unit (both of length 1 where
+    nothing is textured).
     ``base_color``, ``emission`` (M, 3) float32; ``material_info`` (M, 3) int32: base texture, emission texture, double
     sided. ``prev_triangles`` (moving, RECORD) float32: the moving ones one frame ago.
     ``static_count``: number of triangles that never move.
@@ -133,7 +134,8 @@ def _uv_density(uvs: F64, triangles: F32) -> F32:
     uv_area = np.abs((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
     p = triangles[:, :9].reshape(-1, 3, 3).astype(np.float64)
     area = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
-    return np.sqrt(uv_area / np.maximum(area, 1e-30)).astype(np.float32)
+    density: F32 = np.sqrt(uv_area / np.maximum(area, 1e-30)).astype(np.float32)
+    return density
 
 
 def compile_scene(scene: Scene) -> CompiledScene:

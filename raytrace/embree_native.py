@@ -1,7 +1,7 @@
 """The Embree library inside embreex's wheel, called from compiled loops without Python in between.
 
-Camera rays go as packets of 16, fixed blocks of 4x4 pixels, with Embree's coherent traversal; all other rays one by one.
-Against ``EmbreeScene.run`` this traces camera rays 2 to 4 times and others 1.3 times as fast.
+Camera rays go as packets of 16, fixed blocks of 4x4 pixels, with Embree's coherent traversal; all other rays one by
+one. Against ``EmbreeScene.run`` this traces camera rays 2 to 4 times and others 1.3 times as fast.
 
 Functions are bound by symbol name: compiled loops then hold no addresses and can be kept on disk. Layouts and constants
 are those of Embree 4's ``rtcore_ray.h`` and ``rtcore_common.h``.
@@ -59,9 +59,7 @@ _CALLED_FROM_LOOPS = ("rtcIntersect1", "rtcOccluded1", "rtcIntersect16")
 # Pointers are passed as integers of their size: the calling convention is the same, and Numba can compute with them.
 _intersect_one = types.ExternalFunction("rtcIntersect1", types.void(types.uintp, types.uintp, types.uintp))
 _occluded_one = types.ExternalFunction("rtcOccluded1", types.void(types.uintp, types.uintp, types.uintp))
-_intersect_16 = types.ExternalFunction(
-    "rtcIntersect16", types.void(types.uintp, types.uintp, types.uintp, types.uintp)
-)
+_intersect_16 = types.ExternalFunction("rtcIntersect16", types.void(types.uintp, types.uintp, types.uintp, types.uintp))
 
 
 class _Arguments(ctypes.Structure):
@@ -108,9 +106,9 @@ def _aligned(shape: tuple[int, ...]) -> F32:
 
 
 @kernel
-def _single(
+def _single(  # type: ignore[no-untyped-def]
     static, moving, box, arguments, buffer, bits, address, origins, directions, first_moving, triangle, u, v
-):  # type: ignore[no-untyped-def]
+):
     """Nearest hits of single rays. ``buffer`` (24,) float32, its ``bits`` as uint32, and its ``address``."""
     for i in range(origins.shape[0]):
         for k in range(3):
@@ -140,10 +138,10 @@ def _single(
 
 
 @kernel
-def _packets(
+def _packets(  # type: ignore[no-untyped-def]
     static, moving, arguments, buffer, bits, address, valid, valid_address, origins, directions, width, first_moving,
     triangle, u, v,
-):  # type: ignore[no-untyped-def]  # fmt: skip
+):  # fmt: skip
     """Nearest hits of rays that stand in rows of ``width``, by blocks of 4x4. ``buffer`` (24, 16) float32."""
     rows = origins.shape[0] // width
     for by in range(0, rows, 4):
@@ -184,9 +182,9 @@ def _packets(
 
 
 @kernel
-def _shadow(
+def _shadow(  # type: ignore[no-untyped-def]
     static, moving, box, arguments, buffer, bits, address, origins, directions, limits, blocked
-):  # type: ignore[no-untyped-def]
+):
     """Occlusion of single rays: 0 where something is in the way, -1 where not."""
     for i in range(origins.shape[0]):
         for k in range(3):

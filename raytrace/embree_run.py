@@ -97,6 +97,9 @@ class PortableCaster(RayCaster):
             _merge_occlusion(index, also, blocked)
         return blocked
 
+    def close(self) -> None:
+        self._static = self._moving = None
+
     def _select(self, origins: F32, directions: F32, limits: F32) -> I32:
         index = np.empty(len(origins), np.int32)
         return index[: _select_rays(origins, directions, limits, self._box, index)]

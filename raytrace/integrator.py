@@ -32,7 +32,8 @@ I32 = NDArray[np.int32]
 U32 = NDArray[np.uint32]
 
 REFERENCE_SEED = 0x5EED0000
-"""Added to the run's seed for references, whose frame numbers moreover start at 2^31: no path is shared with a frame."""
+"""Added to the run's seed for references, whose frame numbers moreover start at 2^31: no path is shared with a
+frame."""
 
 
 @dataclass(frozen=True)
@@ -226,8 +227,8 @@ class Tracer:
     ) -> FramePacket:
         """Frame ``index`` of the run at one path per pixel, ``size`` = (width, height).
 
-        ``now``, ``previous``: times in seconds of this frame and the one before it. ``cut``: the frame does not continue
-        the one before it.
+        ``now``, ``previous``: times in seconds of this frame and the one before it. ``cut``: the frame does not
+        continue the one before it.
         """
         start = time.perf_counter()
         self.set_time(now, previous)

@@ -3,8 +3,8 @@
 Everything is single precision without fast-math: results then do not depend on how a loop was vectorised, hence not on
 the tile a pixel fell into, and the motion vector of a point that did not move is exactly zero.
 
-Each kernel exists in as many variants as there are combinations of the scene's features (:class:`Variant`); what a scene
-lacks is compiled out. Variants are built on demand and cached on disk by Numba.
+Each kernel exists in as many variants as there are combinations of the scene's features (:class:`Variant`); what a
+scene lacks is compiled out. Variants are built on demand and cached on disk by Numba.
 
 Estimator (Veach 1997; Schied et al. 2017, sec. 3): one camera ray, one bounce ray, one shadow ray at each of the two
 hits. At the first hit the light sample and the bounce ray are combined by the balance heuristic, and what a bounce ray
@@ -22,8 +22,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import uint32
 
-from raytrace.compiled import FACE_NORMAL, LIGHT, MATERIAL, NORMALS, OBJECT, OFFSET, SMOOTH, CompiledScene
 from raytrace.compilation import device, kernel
+from raytrace.compiled import FACE_NORMAL, LIGHT, MATERIAL, NORMALS, OBJECT, OFFSET, SMOOTH, CompiledScene
 from raytrace.sampling import (
     PAIR_BOUNCE,
     PAIR_LIGHT,
@@ -417,7 +417,8 @@ def first_hit_kernel(variant: Variant) -> Callable[..., Any]:
 
 @cache
 def second_hit_kernel(variant: Variant) -> Callable[..., Any]:
-    """Kernel that shades bounce hits: adds light found by the ray to ``direct``, writes shadow rays; returns how many."""
+    """Kernel that shades bounce hits: adds light found by the ray to ``direct``, writes shadow rays; returns how
+    many."""
     textured, has_sky = variant.textured, variant.sky
 
     @kernel

@@ -8,8 +8,8 @@ of threads nor on the tiling, and a remembered surface point can be shaded again
             of its own. The mean over the cycle keeps the noise of 16 samples for ever: for the live filter only.
 ``HASH``    Wang's integer hash (Wang 1997; Koskela et al. 2019 use it). Uncycled: references and statistics use this.
 
-Dimensions come in pairs, because 16 points in a base above 16 would not cover [0, 1): every pair uses bases 2 and 3, and
-its order of visit is scrambled by an XOR of its own, otherwise all pairs would be the same two numbers.
+Dimensions come in pairs, because 16 points in a base above 16 would not cover [0, 1): every pair uses bases 2 and 3,
+and its order of visit is scrambled by an XOR of its own, otherwise all pairs would be the same two numbers.
 """
 
 from __future__ import annotations

@@ -47,9 +47,9 @@ def _halve(image: F64) -> F64:
     """Box-filter to half the size in each direction that is longer than one texel; an odd last row is dropped."""
     height, width = image.shape[:2]
     if height > 1:
-        image = (image[0 : height - height % 2 : 2] + image[1 : height : 2][: height // 2]) / 2
+        image = (image[0 : height - height % 2 : 2] + image[1:height:2][: height // 2]) / 2
     if width > 1:
-        image = (image[:, 0 : width - width % 2 : 2] + image[:, 1 : width : 2][:, : width // 2]) / 2
+        image = (image[:, 0 : width - width % 2 : 2] + image[:, 1:width:2][:, : width // 2]) / 2
     return image
 
 
@@ -105,8 +105,8 @@ def lookup(texels, levels, decode, index, u, v, level):  # type: ignore[no-untyp
     # Wrap first: far from 0 the fraction of u * width would lose the bits that count.
     x = (u - np.float32(math.floor(u))) * np.float32(width) - _HALF
     y = (v - np.float32(math.floor(v))) * np.float32(height) - _HALF
-    x0 = int(math.floor(x))
-    y0 = int(math.floor(y))
+    x0 = math.floor(x)
+    y0 = math.floor(y)
     fx = x - np.float32(x0)
     fy = y - np.float32(y0)
     x1 = x0 + 1 if x0 + 1 < width else x0 + 1 - width
@@ -118,7 +118,10 @@ def lookup(texels, levels, decode, index, u, v, level):  # type: ignore[no-untyp
     a, b = offset + y0 * width + x0, offset + y0 * width + x1
     c, d = offset + y1 * width + x0, offset + y1 * width + x1
     wa, wb, wc, wd = (_ONE - fx) * (_ONE - fy), fx * (_ONE - fy), (_ONE - fx) * fy, fx * fy
-    red = wa * decode[texels[a, 0]] + wb * decode[texels[b, 0]] + wc * decode[texels[c, 0]] + wd * decode[texels[d, 0]]
-    green = wa * decode[texels[a, 1]] + wb * decode[texels[b, 1]] + wc * decode[texels[c, 1]] + wd * decode[texels[d, 1]]
-    blue = wa * decode[texels[a, 2]] + wb * decode[texels[b, 2]] + wc * decode[texels[c, 2]] + wd * decode[texels[d, 2]]
+    red = wa * decode[texels[a, 0]] + wb * decode[texels[b, 0]]
+    green = wa * decode[texels[a, 1]] + wb * decode[texels[b, 1]]
+    blue = wa * decode[texels[a, 2]] + wb * decode[texels[b, 2]]
+    red += wc * decode[texels[c, 0]] + wd * decode[texels[d, 0]]
+    green += wc * decode[texels[c, 1]] + wd * decode[texels[d, 1]]
+    blue += wc * decode[texels[c, 2]] + wd * decode[texels[d, 2]]
     return red, green, blue

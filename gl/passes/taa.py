@@ -1,4 +1,5 @@
-"""Temporal anti-aliasing. Karis 2014, "High Quality Temporal Supersampling" (SIGGRAPH, Advances in Real-Time Rendering).
+"""Temporal anti-aliasing. Karis 2014, "High Quality Temporal Supersampling" (SIGGRAPH, Advances in Real-Time
+Rendering).
 
 Runs on tone-mapped colour, as Schied et al. 2017 and Koskela et al. 2019 place it.
 

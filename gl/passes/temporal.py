@@ -33,7 +33,9 @@ class Reproject(FragmentPass):
     in_motion = In("xy: previous uv - uv; z: expected previous depth, scene units; w: object id, -1 = miss")
     in_surface = In("xyz: shading normal, world; w: depth, scene units")
     in_gradient = In("depth change per pixel, scene units")
-    in_prev_normal = In("xyz: the point's normal in the last frame, world; scenes in which something moves", optional=True)
+    in_prev_normal = In(
+        "xyz: the point's normal in the last frame, world; scenes in which something moves", optional=True
+    )
     prev_guide = Prev(GUIDE)
     out_reprojection = Out("rgba32f", REPROJECTION)
     out_guide = Out("rgba32f", GUIDE)

@@ -108,7 +108,7 @@ def test_the_references_are_of_this_scene(case: Case) -> None:
 
 
 def test_svgf_beats_the_noisy_frame(whole: Score) -> None:
-    assert whole.error < 0.21
+    assert whole.error < 0.17
     assert whole.flicker < 0.06
     assert whole.energy == pytest.approx(1.0, abs=0.03)
 
@@ -122,7 +122,7 @@ def test_the_paper_s_parameters_do_nearly_as_well(ctx: moderngl.Context, case: C
 
 def test_both_signals_together_do_nearly_as_well(ctx: moderngl.Context, case: Case) -> None:
     joint = score(ctx, case, "svgf", Svgf(separate=False))
-    assert joint.error < 0.24
+    assert joint.error < 0.19
     assert joint.flicker < 0.07
     assert joint.energy == pytest.approx(1.0, abs=0.03)
 
@@ -138,13 +138,13 @@ BAD = {
 @pytest.mark.parametrize("part", BAD)
 def test_every_part_of_it_is_needed(ctx: moderngl.Context, case: Case, whole: Score, part: str) -> None:
     without = score(ctx, case, "svgf", BAD[part])
-    assert without.error > 1.15 * whole.error
-    assert without.flicker > 1.15 * whole.flicker
+    assert without.error > 1.2 * whole.error
+    assert without.flicker > whole.flicker
 
 
 def test_accumulation_alone_lies_between(ctx: moderngl.Context, case: Case, whole: Score) -> None:
     """With a share of 0.2 of each new frame a ninth of the variance stays: a third of the error."""
     alone = score(ctx, case, "accumulate", Svgf())
-    assert 1.15 * whole.error < alone.error < 0.4
+    assert 1.2 * whole.error < alone.error < 0.4
     assert 3.0 * whole.flicker < alone.flicker < 0.4
     assert alone.energy == pytest.approx(1.0, abs=0.01)

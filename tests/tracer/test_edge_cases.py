@@ -7,9 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from errors import UserError
 from raytrace.camera import Camera
-from raytrace.compiled import compile_scene
 from raytrace.frame import MISS, FramePacket
 from raytrace.scene import Material, Scene
 from tests.tracer.conftest import OpenTracer
@@ -141,11 +139,6 @@ def test_an_eye_inside_a_wall_or_on_it(trace: OpenTracer) -> None:
     inside = Camera.look_at((1.0, 0.0, 0.0), (-1.0, 0.2, 0.3))
     frame = still(trace(replace(cornell(), camera=inside)), (16, 12))
     assert_finite(frame)
-
-
-def test_a_scene_without_triangles_is_refused() -> None:
-    with pytest.raises(UserError, match="no triangle"):
-        compile_scene(Scene("nothing", (), (GREY,), CAMERA))
 
 
 def test_threads_end_with_the_tracer(trace: OpenTracer) -> None:
