@@ -103,7 +103,7 @@ class Svgf(Section):
 
     preset: str = param("best", choices=("paper", "best"), doc="values for the keys of this section that are not set")
     alpha: float = param(0.2, 0, 1, "[0;1] smallest share of the new frame in the accumulated colour; 0: running mean")
-    alpha_moments: float = param(0.2, 0, 1, "[0;1] smallest share of the new frame in the luminance moments")
+    alpha_moments: float = param(0.2, 0, 0.5, "[0;0.5] smallest share of the new frame in the luminance moments")
     max_history: int = param(255, 10, 255, "[10;255] longest history counted, in frames")
     iterations: int = param(5, 0, 8, "[0;8] à-trous iterations; number i takes every 2^i-th pixel", structural=True)
     feedback_level: int = param(

@@ -32,7 +32,8 @@ class FramePacket:
     ``gradient`` (H, W, 2): d depth / d pixel in x and y of the tangent plane, scene units; 0 on a miss.
     ``motion`` (H, W, 4): xy = previous uv minus uv; z = depth the surface point had in the previous frame (<= 0: it was
     behind the camera; on a miss 0); w = object id, MISS on a miss. Unjittered; exactly 0 where nothing moves.
-    ``prev_normal`` (H, W, 4): xyz = shading normal that the surface point had one frame ago, world space; w = 0. None in a scene without moving objects: there it equals the normal.
+    ``prev_normal`` (H, W, 4): xyz = shading normal that the surface point had one frame ago, world space; w = 0.
+    None in a scene without moving objects: there it equals the normal.
     ``position``, ``prev_position`` (H, W, 4): xyz = surface point now and a frame ago, relative to the scene's origin;
     a = 1 on surfaces. None unless asked for.
 

@@ -38,18 +38,29 @@ class TextureAtlas:
     levels: NDArray[np.int64]
 
 
-def _encode(linear: F64) -> NDArray[np.uint8]:
+# Mip levels are averaged as 16-bit linear integers: exact sums, and both transfer curves are one table lookup.
+_LINEAR_16 = np.rint(SRGB_TO_LINEAR.astype(np.float64) * 65535.0).astype(np.uint16)
+
+
+def _encode_table() -> NDArray[np.uint8]:
+    """The 8-bit sRGB code nearest to each of the 65,536 linear values."""
+    linear = np.arange(65536) / 65535.0
     srgb = np.where(linear <= 0.0031308, linear * 12.92, 1.055 * np.maximum(linear, 1e-9) ** (1 / 2.4) - 0.055)
-    return np.rint(np.clip(srgb, 0.0, 1.0) * 255.0).astype(np.uint8)
+    return np.rint(srgb * 255.0).astype(np.uint8)
 
 
-def _halve(image: F64) -> F64:
+_ENCODE_16 = _encode_table()
+
+
+def _halve(image: NDArray[np.uint16]) -> NDArray[np.uint16]:
     """Box-filter to half the size in each direction that is longer than one texel; an odd last row is dropped."""
     height, width = image.shape[:2]
     if height > 1:
-        image = (image[0 : height - height % 2 : 2] + image[1:height:2][: height // 2]) / 2
+        even, odd = image[0 : height - height % 2 : 2].astype(np.uint32), image[1 : height - height % 2 + 1 : 2]
+        image = ((even + odd + 1) >> 1).astype(np.uint16)
     if width > 1:
-        image = (image[:, 0 : width - width % 2 : 2] + image[:, 1:width:2][:, : width // 2]) / 2
+        even, odd = image[:, 0 : width - width % 2 : 2].astype(np.uint32), image[:, 1 : width - width % 2 + 1 : 2]
+        image = ((even + odd + 1) >> 1).astype(np.uint16)
     return image
 
 
@@ -60,7 +71,7 @@ def build_atlas(textures: Sequence[Texture]) -> TextureAtlas:
     offset = 0
     for index, texture in enumerate(textures):
         pixels = np.ascontiguousarray(texture.pixels[..., :3])
-        linear: F64 | None = None
+        linear: NDArray[np.uint16] | None = None
         for level in range(MAX_LEVELS):
             height, width = pixels.shape[:2]
             levels[index, level:] = offset, width, height
@@ -69,23 +80,27 @@ def build_atlas(textures: Sequence[Texture]) -> TextureAtlas:
             if width == 1 and height == 1:
                 break
             if linear is None:
-                linear = SRGB_TO_LINEAR[pixels].astype(np.float64)
+                linear = _LINEAR_16[pixels]
             linear = _halve(linear)
-            pixels = _encode(linear)
+            pixels = _ENCODE_16[linear]
     texels = np.concatenate(parts) if parts else np.zeros((1, 3), np.uint8)
     return TextureAtlas(texels, levels)
+
+
+def _decode(texels: NDArray[np.uint8]) -> F64:
+    return SRGB_TO_LINEAR[texels].astype(np.float64)
 
 
 def sample_bilinear(atlas: TextureAtlas, index: int, uvs: F64, level: int = 0) -> F64:
     """A level at ``uvs`` (n, 2), bilinear and repeated: (n, 3) float64, linear. The NumPy twin of `lookup`."""
     offset, width, height = (int(v) for v in atlas.levels[index, level])
-    image = SRGB_TO_LINEAR[atlas.texels[offset : offset + width * height]].reshape(height, width, 3).astype(np.float64)
+    texels = atlas.texels[offset : offset + width * height].reshape(height, width, 3)
     x, y = uvs[:, 0] * width - 0.5, uvs[:, 1] * height - 0.5
     x0, y0 = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
     fx, fy = (x - x0)[:, None], (y - y0)[:, None]
     x0, x1, y0, y1 = x0 % width, (x0 + 1) % width, y0 % height, (y0 + 1) % height
-    low = image[y0, x0] * (1 - fx) + image[y0, x1] * fx
-    high = image[y1, x0] * (1 - fx) + image[y1, x1] * fx
+    low = _decode(texels[y0, x0]) * (1 - fx) + _decode(texels[y0, x1]) * fx
+    high = _decode(texels[y1, x0]) * (1 - fx) + _decode(texels[y1, x1]) * fx
     result: F64 = low * (1 - fy) + high * fy
     return result
 

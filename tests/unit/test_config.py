@@ -27,7 +27,7 @@ def test_without_sources_the_defaults_hold():
 
 
 def test_file_beats_preset_and_override_beats_file(tmp_path, monkeypatch):
-    monkeypatch.setitem(PRESETS["svgf"], "paper", {"alpha": 0.5, "sigma_l": 9.0, "iterations": 2})
+    monkeypatch.setitem(PRESETS["svgf"], "best", {"alpha": 0.5, "sigma_l": 9.0, "iterations": 2})
     path = write(tmp_path, "[svgf]\nsigma_l = 3\niterations = 4\n[display]\nexposure = -1.5\n")
     loaded = load(path, ["svgf.iterations=6", "taa.clip=false"])
     assert (loaded.svgf.alpha, loaded.svgf.sigma_l, loaded.svgf.iterations) == (0.5, 3.0, 6)
@@ -109,7 +109,7 @@ def test_bounds_are_inclusive_and_hold(name):
         ("svgf.temporal=True", 'must be true or false, not "True"'),
         ("render.sequence=hasch", """must be "halton" | "hash", not "hasch", did you mean 'hash'?"""),
         ("render.jitter=true", 'must be "auto" | "on" | "off", not true'),
-        ("svgf.preset=best", 'must be "paper", not "best"'),
+        ("svgf.preset=bost", 'must be "paper" | "best", not "bost", did you mean \'best\'?'),
     ],
 )
 def test_wrong_overrides_say_what_is_wrong(override, message):
