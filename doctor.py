@@ -132,7 +132,7 @@ def _opengl(facts: Facts, machine: setup.Machine) -> Finding:
 def _embree(facts: Facts) -> Finding:
     if "error" in facts:
         return Finding(False, "embree", facts["error"], REINSTALL)
-    return Finding(True, "embree", f"a ray hits a triangle at {facts['distance']}")
+    return Finding(True, "embree", f"a ray hits a triangle at {facts['distance']}; rays go through {facts['backend']}")
 
 
 def _numba(facts: Facts) -> Finding:
@@ -205,7 +205,9 @@ def _probe_embree() -> Facts:
     if hit["primID"][0] != 0:
         raise RuntimeError("the ray misses the triangle")
     del mesh
-    return {"distance": f"{hit['tfar'][0]:.6g}"}
+    from raytrace.embree import describe_backend
+
+    return {"distance": f"{hit['tfar'][0]:.6g}", "backend": describe_backend()}
 
 
 def _probe_numba() -> Facts:

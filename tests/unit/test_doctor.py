@@ -15,7 +15,7 @@ from tools.setup import Need
 
 SOUND: dict[str, Facts] = {
     "gl": {"version": "450", "renderer": "some card", "shared_memory": "32768"},
-    "embree": {"distance": "2"},
+    "embree": {"distance": "2", "backend": "Embree's library"},
     "numba": {"cpu": "some processor"},
     "window": {"version": "3.4.0", "platform": "X11"},
 }
@@ -45,7 +45,7 @@ def test_real_report_names_everything_and_is_ok():
     for subject in ("python", "packages", "libraries", "opengl", "embree", "numba", "cores", "display", "cache"):
         assert line(text, subject)
     assert "KiB shared memory" in line(text, "opengl")
-    assert line(text, "embree").startswith("ok       embree    a ray hits a triangle at 2\n")
+    assert line(text, "embree").startswith("ok       embree    a ray hits a triangle at 2; rays go through ")
 
 
 def test_headless_is_a_note_and_no_failure(probes):
