@@ -12,6 +12,7 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,7 @@ from bench.cases import FIRST_MEASURED, FRAMES, SCORED, SCORED_PAIRS
 from bench.metrics import Mask, pooled, rmse, temporal_difference
 from bench.references import Reference, temporal_noise
 from bench.timing import Summary
-from config import Config
+from config import PRESETS, Config
 from console import Progress
 from errors import UserError
 from gl.profiler import Profiler, is_software
@@ -36,16 +37,25 @@ UPLOAD = "upload"
 
 @dataclass(frozen=True)
 class Method:
-    """A denoiser of gl/pipelines.py with what differs from the user's parameters. ``separate`` None: it has none."""
+    """A denoiser of gl/pipelines.py with what differs from the user's parameters. ``separate`` None: it has none.
+
+    ``preset``: its values win over the user's; empty: the user's stand.
+    """
 
     name: str
     denoiser: str
     taa: bool = False
     separate: bool | None = None
+    preset: str = ""
 
     def configure(self, config: Config) -> Config:
         """``config`` as this method needs it."""
-        svgf = config.svgf if self.separate is None else replace(config.svgf, separate=self.separate)
+        svgf = config.svgf
+        if self.preset:
+            values: dict[str, Any] = dict(PRESETS["svgf"][self.preset])
+            svgf = replace(svgf, preset=self.preset, **values)
+        if self.separate is not None:
+            svgf = replace(svgf, separate=self.separate)
         return replace(config, svgf=svgf, taa=replace(config.taa, enabled=self.taa))
 
 
@@ -57,11 +67,11 @@ APART_TAA = replace(APART, name=f"{APART.name} + TAA", taa=True)
 METHODS = (
     NOISY,
     Method("accumulation", "accumulate"),
-    Method("accumulation + TAA", "accumulate", taa=True),
     ONE_SIGNAL,
     ONE_SIGNAL_TAA,
     APART,
     APART_TAA,
+    Method("SVGF as published", "svgf", separate=True, preset="paper"),
 )
 
 

@@ -1,7 +1,8 @@
 """The Embree library inside embreex's wheel, called from compiled loops without Python in between.
 
 Camera rays go as packets of 16, fixed blocks of 4x4 pixels, with Embree's coherent traversal; all other rays one by
-one. Against ``EmbreeScene.run`` this traces camera rays 2 to 4 times and others 1.3 times as fast.
+one. Against ``EmbreeScene.run`` this traced camera rays 2.5 to 4.4 times and others 1.3 to 1.6 times as fast (a room of
+154,000 triangles, an empty box; two cores).
 
 Functions are bound by symbol name: compiled loops then hold no addresses and can be kept on disk. Layouts and constants
 are those of Embree 4's ``rtcore_ray.h`` and ``rtcore_common.h``.

@@ -13,7 +13,7 @@ import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -268,7 +268,7 @@ class Tracer:
         count = size[0] * size[1]
         sums = np.zeros((2, count, 3))
         normal = self.settings
-        self.settings = Settings(seed=(normal.seed + REFERENCE_SEED) & 0xFFFFFFFF, generator=HASH, tile=normal.tile)
+        self.settings = replace(normal, seed=(normal.seed + REFERENCE_SEED) & 0xFFFFFFFF, generator=HASH)
         done = [0]
 
         def tile(pixels: I32) -> None:

@@ -105,11 +105,12 @@ def _filter_signal(
         unfiltered = x
     if history is not None and p.feedback < 0:
         g.feed(history, unfiltered)
-    scaled = reprojection is not None and p.variance_guided and p.accumulated_variance
+    length: dict[str, Tex] = {}
+    if reprojection is not None and p.variance_guided and p.accumulated_variance:
+        length = {"in_reprojection": reprojection}
     for i in range(p.iterations):
-        length = {"in_reprojection": reprojection} if scaled and i == 0 else {}
         iteration = Atrous(p, 1 << i, pixel_size, raw=x is noisy)
-        x = g.add(iteration, f"atrous{i}", in_color=x, **shape, **length).out_color
+        x = g.add(iteration, f"atrous{i}", in_color=x, **shape, **(length if i == 0 else {})).out_color
         if history is not None and i == p.feedback:
             g.feed(history, x)  # no copy: x is written into the history's other half
     return x

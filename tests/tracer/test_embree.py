@@ -101,7 +101,8 @@ def test_packets_find_what_single_rays_find(size: tuple[int, int]) -> None:
 def test_native_and_portable_casters_agree_on_a_large_batch() -> None:
     triangles = soup(2000, 5)
     direct, portable = open_caster(triangles, 2000, "native"), open_caster(triangles, 2000, "run")
-    assert isinstance(direct, NativeCaster) and isinstance(portable, PortableCaster)
+    assert isinstance(direct, NativeCaster)
+    assert isinstance(portable, PortableCaster)
     origins, directions = rays(20_000, 6)
     first, second = direct.intersect(origins, directions), portable.intersect(origins, directions)
     assert (first[0] != second[0]).mean() < 1e-3

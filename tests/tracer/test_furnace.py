@@ -17,13 +17,9 @@ from tests.tracer.scenes import (
     mesh,
     placed,
     quad,
-    repeated,
     scene,
-    seeds_of,
-    shade,
     sphere,
     still,
-    view_of,
 )
 from tests.tracer.statistics import Estimate, assert_same
 
@@ -144,16 +140,3 @@ def test_the_side_that_is_seen_is_the_side_that_is_lit(trace: OpenTracer) -> Non
     np.testing.assert_allclose(above.direct, np.tile(SKY, (200, 1)), rtol=2e-6)
     assert not below.direct.any()
     assert not below.indirect.any()
-
-
-def test_shading_depends_on_the_side_of_the_eye_alone(trace: OpenTracer) -> None:
-    """As the docstring of `Tracer.shade` says: any eye on the same side gives the same bits."""
-    what = scene([mesh("sheet", quad((-1, 0, 1), (1, 0, 1), (1, 0, -1), (-1, 0, -1)))], [WHITE], CAMERA, SKY)
-    t = trace(what)
-    view = view_of(t, Camera.look_at((0.3, 2.0, 0.4), (0.1, 0.0, 0.2)), (1, 1))
-    hits = repeated(t.primary(view, np.zeros(1, np.int32)), 0, 500)
-    first = shade(t, hits, seeds_of(500), view.eye)
-    for eye in ((5.0, 0.01, -7.0), (0.0, 900.0, 0.0)):
-        other = shade(t, hits, seeds_of(500), np.array(eye, np.float32))
-        for a, b in zip(first, other, strict=True):
-            np.testing.assert_array_equal(a, b)
