@@ -1,29 +1,34 @@
-"""The commands that need no window: render one picture, print a graph, fly the demo."""
+"""The commands that need no window: render one picture, print a graph."""
 
 from __future__ import annotations
 
-import time
+import argparse
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from statistics import median
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.metrics import rmse
+from bench.storage import require_writable
 from config import Config
-from console import Progress, table
+from console import Progress
 from errors import UserError, did_you_mean
 from gl.context import create_headless
 from gl.executor import Result
 from gl.pipelines import FrameTraits, build
 from gl.renderer import Renderer, read
-from images import side_by_side, to_srgb8, write_apng, write_exr, write_png
+from images import to_srgb8, write_exr, write_png
 from raytrace.frame import FramePacket
-from raytrace.shot import FPS, Shot, modulate
+from raytrace.shot import Shot, modulate
 from session import open_shot
 
 F32 = NDArray[np.float32]
+U8 = NDArray[np.uint8]
+
+PATHS_AT_ONCE = 2_000_000
+"""Of references, about a second's worth: between two portions progress is shown and Ctrl-C heard."""
 
 
 @dataclass(frozen=True)
@@ -41,49 +46,133 @@ class RenderJob:
     exr: bool
     show: str
 
+    @staticmethod
+    def of(args: argparse.Namespace, config: Config) -> RenderJob:
+        """From the parsed command line; ``--spp`` is ``--frames`` where it is not given."""
+        return RenderJob(
+            scene=args.scene,
+            denoiser=args.denoiser,
+            frames=args.frames,
+            samples=args.spp or args.frames,
+            camera=args.camera,
+            animate=args.animate,
+            jitter=args.jitter or config.render.jitter == "on",
+            out=args.out,
+            exr=args.exr,
+            show=args.show,
+        )
+
 
 def render(job: RenderJob, config: Config) -> None:
-    """Render frame ``job.frames - 1`` of the shot and write it."""
-    shot = open_shot(job.scene, config, job.camera, job.animate, job.jitter)
-    with shot.tracer:
-        renderer = Renderer(create_headless())
-        keep = (job.show,) if job.show else ()
-        _check_show(job, config, shot)
-        last = job.frames - 1
-        reference = None
-        # Without a history only the last frame matters, and it looks the same on its own.
-        first = 0 if job.denoiser in ("accumulate", "svgf") else last
-        with Progress(f"{job.denoiser}: {job.frames - first} frames") as progress:
-            for index in range(first, last + 1):
-                packet = shot.frame(index)
-                if job.denoiser == "reference":
-                    reference = modulate(packet, *shot.reference(index, job.samples, progress.update))
-                result = renderer.run(packet, config, job.denoiser, reference, keep)
-                progress.update((index + 1 - first) / (job.frames - first))
+    """Render frame ``job.frames - 1`` of the shot and write it. What cannot work is refused before the work."""
+    require_writable(job.out)
+    if job.exr:
+        require_writable(job.out.with_suffix(".exr"))
+    with ExitStack() as stack:
+        renderer = open_renderer((config.render.width, config.render.height), stack)
+        shot = open_shot(job.scene, config, job.camera, job.animate, job.jitter)
+        stack.enter_context(shot.tracer)
+        _require_texture(job, config, shot)
+        with telling_of_memory(renderer, shot.size):
+            result = _last_frame(job, config, shot, renderer)
         _write_result(job, result)
-        renderer.release()
 
 
-def _check_show(job: RenderJob, config: Config, shot: Shot) -> None:
-    """Refuse an unknown texture before the work, not after it."""
+def open_renderer(size: tuple[int, int], stack: ExitStack) -> Renderer:
+    """A renderer on a context of its own, both released by ``stack``.
+
+    Raises UserError where there is no OpenGL 4.3, or none that can draw pictures of ``size``.
+    """
+    ctx = create_headless()
+    stack.callback(ctx.release)
+    largest = ctx.info["GL_MAX_TEXTURE_SIZE"]
+    if max(size) > largest:
+        raise UserError(
+            f"{size[0]}x{size[1]} pixels: {ctx.info['GL_RENDERER']} can draw {largest}x{largest} at most",
+            "choose a smaller --size",
+        )
+    renderer = Renderer(ctx)
+    with telling_of_memory(renderer, size):
+        ctx.texture(size, 4, dtype="f4").release()
+    stack.callback(renderer.release)
+    return renderer
+
+
+@contextmanager
+def telling_of_memory(renderer: Renderer, size: tuple[int, int]) -> Iterator[None]:
+    """Turn OpenGL's lack of memory, which it reports as a flag and through later failures, into a UserError."""
+    failure: Exception | None = None
+    try:
+        yield
+    except Exception as error:
+        failure = error
+    if renderer.ctx.error == "GL_OUT_OF_MEMORY":
+        message = f"{size[0]}x{size[1]} pixels: {renderer.ctx.info['GL_RENDERER']} has not enough memory for them"
+        raise UserError(message, "choose a smaller --size") from failure
+    if failure is not None:
+        raise failure
+
+
+def _last_frame(job: RenderJob, config: Config, shot: Shot, renderer: Renderer) -> Result:
+    last = job.frames - 1
+    keep = (job.show,) if job.show else ()
+    if job.denoiser == "reference":
+        with Progress(f"reference: {job.samples} paths per pixel") as progress:
+            packet = shot.frame(last)
+            truth = reference_of(shot, packet, job.samples, progress.update)
+        return renderer.run(packet, config, job.denoiser, truth, keep)
+    # Without a history only the last frame matters, and it looks the same on its own.
+    first = last if job.denoiser == "none" else 0
+    with Progress(f"{job.denoiser}: frames {first} to {last}") as progress:
+        for index in range(first, job.frames):
+            packet = shot.frame(index)
+            result = renderer.run(packet, config, job.denoiser, keep=keep)
+            progress.update((index + 1 - first) / (job.frames - first))
+    return result
+
+
+def reference_of(shot: Shot, packet: FramePacket, samples: int, progress: Callable[[float], None]) -> F32:
+    """Mean of ``samples`` paths per pixel of the frame of ``packet``, its camera (jitter included) and time held.
+
+    (H, W, 4) float32 radiance.
+    """
+    width, height = shot.size
+    camera = shot.camera(packet.index).with_jitter(packet.jitter)
+    portion = max(1, PATHS_AT_ONCE // (width * height))
+    direct, indirect = np.zeros((2, height, width, 3))
+    for first in range(0, samples, portion):
+        count = min(portion, samples - first)
+        means = shot.tracer.reference(camera, shot.size, count, packet.time, first)
+        direct += means[0] * (count / samples)
+        indirect += means[1] * (count / samples)
+        progress((first + count) / samples)
+    return modulate(packet, direct, indirect)
+
+
+def _require_texture(job: RenderJob, config: Config, shot: Shot) -> None:
+    """Raises UserError, listing what there is, when the graph has no texture of the name asked for."""
     if not job.show:
         return
     plan = build(config, job.denoiser, FrameTraits(moving=shot.scene.has_motion)).compile()
     known = sorted({tex.name for tex in (*plan.imports, *plan.slot_of, *plan.feeds)})
     if job.show not in known:
-        listing = "\n  ".join(known)
+        listing = "\n    ".join(known)
         raise UserError(
-            f"--show {job.show}: no such texture{did_you_mean(job.show, known)}", f"there are:\n  {listing}"
+            f"--show {job.show}: {job.denoiser} has no such texture{did_you_mean(job.show, known)}",
+            f"there are:\n    {listing}",
         )
 
 
 def _write_result(job: RenderJob, result: Result) -> None:
     if job.show:
-        values = read(result.texture(job.show))
-        write_png(job.out, to_srgb8(viewable(values)))
-        exr = values[..., :3] if values.shape[2] >= 3 else np.repeat(values[..., :1], 3, axis=2)
+        texture = result.texture(job.show)
+        values = read(texture)
+        encoded = texture.dtype == "f1"  # eight bits are for the screen: sRGB already
+        write_png(job.out, to_8bit(values) if encoded else to_srgb8(viewable(values)))
+        channels = values.shape[2]
+        exr = values[..., :3] if channels >= 3 else np.pad(values, ((0, 0), (0, 0), (0, 3 - channels)))
     else:
-        write_png(job.out, (read(result.outputs["display"])[..., :3] * 255.0 + 0.5).astype(np.uint8))
+        write_png(job.out, display_of(result))
         exr = read(result.outputs["radiance"])[..., :3]
     print(job.out)
     if job.exr:
@@ -92,8 +181,21 @@ def _write_result(job: RenderJob, result: Result) -> None:
         print(path)
 
 
+def display_of(result: Result) -> U8:
+    """The picture for the screen, (H, W, 3) uint8 sRGB."""
+    return to_8bit(read(result.outputs["display"]))
+
+
+def to_8bit(values: F32) -> U8:
+    """(H, W, >= 3) values in [0, 1] of an 8-bit texture back to (H, W, 3) uint8."""
+    return (values[..., :3] * 255.0 + 0.5).astype(np.uint8)
+
+
 def viewable(values: F32) -> F32:
-    """(H, W, C) values of any range as (H, W, 3) in [0, 1]: one channel as grey, two with blue 0, scaled by range."""
+    """(H, W, C) values of any range as (H, W, 3) in [0, 1]: one channel as grey, two with blue 0, scaled by range.
+
+    The range includes 0 and leaves out the highest and the lowest hundredth; values in [0, 1] stay as they are.
+    """
     channels = values.shape[2]
     if channels == 1:
         rgb = np.repeat(values, 3, axis=2)
@@ -114,64 +216,3 @@ def print_graph(config: Config, denoiser: str, dot: bool, moving: bool = False) 
     """The compiled plan of one frame, as text or Graphviz."""
     plan = build(config, denoiser, FrameTraits(moving=moving)).compile()
     print(plan.dot() if dot else plan.text())
-
-
-DEMO_FRAMES = 32
-DEMO_SAMPLES = 64
-
-
-def demo(config: Config, scene: str, out: Path) -> None:
-    """What ``make run`` does without a display: a flight, ``demo.png`` and ``demo_flight.png``, and a table."""
-    shot = open_shot(scene, config, "flight", animate=False)
-    with shot.tracer:
-        renderer = Renderer(create_headless())
-        packets: list[FramePacket] = []
-        pictures: list[NDArray[np.uint8]] = []
-        trace_ms: list[float] = []
-        filter_ms: list[float] = []
-        with Progress(f"{scene}: flight of {DEMO_FRAMES} frames") as progress:
-            for index in range(DEMO_FRAMES):
-                packet = shot.frame(index)
-                start = time.perf_counter()
-                result = renderer.run(packet, config, "svgf")
-                renderer.ctx.finish()
-                filter_ms.append((time.perf_counter() - start) * 1e3)
-                trace_ms.append(packet.timings["trace"] * 1e3)
-                packets = [packet]
-                pictures.append(_display(result))
-                progress.update((index + 1) / DEMO_FRAMES)
-        filtered = read(result.outputs["radiance"])[..., :3]
-        packet = packets[-1]
-        noisy_picture = _display(renderer.run(packet, config, "none"))
-        picture = out / "demo.png"
-        write_png(picture, side_by_side([noisy_picture, pictures[-1]]))
-        print(f"{picture} (noisy | SVGF)", flush=True)
-        flight = out / "demo_flight.png"
-        write_apng(flight, pictures, round(1000 / FPS))
-        print(f"{flight} (animation)", flush=True)
-
-        with Progress(f"{scene}: reference, {DEMO_SAMPLES} paths per pixel of one frame") as progress:
-            reference = modulate(packet, *shot.reference(DEMO_FRAMES - 1, DEMO_SAMPLES, progress.update))
-        reference_picture = _display(renderer.run(packet, config, "reference", reference))
-        write_png(picture, side_by_side([noisy_picture, pictures[-1], reference_picture]))
-        print(f"{picture} (noisy | SVGF | reference)")
-        print()
-        surfaces = packet.emission[..., :3].max(axis=2) == 0.0
-        rows = []
-        for name, image, ms in (
-            ("noisy", packet.radiance(), 0.0),
-            ("SVGF + TAA", filtered, median(filter_ms[8:])),
-        ):
-            error = rmse(image, reference[..., :3], surfaces)
-            rows.append((name, f"{median(trace_ms[8:]):.0f}", f"{ms:.0f}", f"{error:.4f}"))
-        print(table(("last frame", "trace ms", "filter ms", f"RMSE against {DEMO_SAMPLES} paths"), rows))
-        width, height = shot.size
-        print(
-            f"\n{width}x{height}, {shot.tracer.threads} threads, {renderer.ctx.info['GL_RENDERER']}; "
-            "error before anti-aliasing, on linear radiance without the lamps"
-        )
-        renderer.release()
-
-
-def _display(result: Result) -> NDArray[np.uint8]:
-    return (read(result.outputs["display"])[..., :3] * 255.0 + 0.5).astype(np.uint8)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 import threading
 from pathlib import Path
@@ -9,13 +10,18 @@ from pathlib import Path
 import assets
 from config import Config
 from console import Progress
-from errors import UserError
+from errors import UserError, did_you_mean
+from raytrace.camera import Camera
 from raytrace.compiled import CompiledScene, compile_scene
 from raytrace.integrator import Settings, Tracer
-from raytrace.load import load_scene
 from raytrace.sampling import HALTON, HASH
 from raytrace.scene import Scene
 from raytrace.shot import Shot, read_camera_path
+
+BYTES_PER_PIXEL = 600
+"""Main memory that a frame takes, textures included (a software renderer's are there too): measured with SVGF."""
+
+_SURE_TO_COMPILE = 2.0  # seconds; kernels from the disk are there within one
 
 
 def find_scene(name: str, animate: bool) -> Scene:
@@ -23,8 +29,13 @@ def find_scene(name: str, animate: bool) -> Scene:
     if name in assets.SCENES:
         return assets.build(name, animate)
     if Path(name).suffix or Path(name).exists():
+        from raytrace.load import load_scene  # slow to import, and not needed above
+
         return load_scene(name)
-    return assets.build(name, animate)  # raises, naming what there is
+    raise UserError(
+        f"--scene {name}: neither a built-in scene nor a file{did_you_mean(name, assets.SCENES)}",
+        f"built in are: {', '.join(assets.SCENES)}",
+    )
 
 
 def open_tracer(scene: Scene, config: Config, positions: bool = False) -> tuple[CompiledScene, Tracer]:
@@ -40,10 +51,8 @@ def open_tracer(scene: Scene, config: Config, positions: bool = False) -> tuple[
         positions=positions,
     )
     tracer = Tracer(compiled, settings)
-    late = threading.Timer(
-        1.0,
-        lambda: print("compiling the tracer's kernels, once for each kind of scene ...", file=sys.stderr, flush=True),
-    )
+    text = "compiling the tracer's kernels, once for each kind of scene ..."
+    late = threading.Timer(_SURE_TO_COMPILE, lambda: print(text, file=sys.stderr, flush=True))
     late.daemon = True
     late.start()
     try:
@@ -53,20 +62,56 @@ def open_tracer(scene: Scene, config: Config, positions: bool = False) -> tuple[
     return compiled, tracer
 
 
-def open_shot(name: str, config: Config, camera: str, animate: bool, jitter: bool = False) -> Shot:
+def open_shot(name: str, config: Config, camera: str | None, animate: bool, jitter: bool = False) -> Shot:
     """Everything between a scene's name and its frames. Notices of the loader go to stderr.
 
-    ``camera``: "still", "flight", or the path of a camera path in JSON.
+    ``camera``: "still", "flight", the path of a camera path in JSON, or None for the flight if the scene has one.
+    Raises UserError for a scene or camera that cannot be had, and for a picture that memory has no room for.
     """
+    size = config.render.width, config.render.height
+    require_memory(size)
+    path = None if camera is None else _camera_path(camera)
     scene = find_scene(name, animate)
     for notice in scene.notices:
         print(f"{scene.name}: {notice}", file=sys.stderr)
     if animate and not scene.has_motion:
         print(f"{scene.name}: nothing in this scene moves", file=sys.stderr)
-    path = "still" if camera == "still" else "flight" if camera == "flight" else read_camera_path(Path(camera))
-    if camera == "flight" and scene.flight is None:
+    if path is None:
+        path = "still" if scene.flight is None else "flight"
+    if path == "flight" and scene.flight is None:
         raise UserError(
-            f"{scene.name}: this scene has no flight", "use --camera still, or a camera path: --camera path.json"
+            f"--camera flight: {scene.name} has no flight", "use --camera still, or a camera path: --camera path.json"
         )
     compiled, tracer = open_tracer(scene, config)
-    return Shot(compiled, tracer, (config.render.width, config.render.height), path, animate, jitter)
+    return Shot(compiled, tracer, size, path, animate, jitter)
+
+
+def _camera_path(camera: str) -> str | list[Camera]:
+    if camera in ("still", "flight"):
+        return camera
+    if not Path(camera).suffix and not Path(camera).exists():
+        hint = did_you_mean(camera, ("still", "flight"))
+        raise UserError(f"--camera {camera}: neither still nor flight nor a file{hint}")
+    return read_camera_path(Path(camera))
+
+
+def require_memory(size: tuple[int, int]) -> None:
+    """Raises UserError where frames of ``size`` would not fit: a system that runs out may end programs unasked."""
+    free, needed = _free_memory(), size[0] * size[1] * BYTES_PER_PIXEL
+    if free is not None and needed > free:
+        raise UserError(
+            f"{size[0]}x{size[1]} pixels need about {needed / 1e9:.1f} GB of memory, {free / 1e9:.1f} GB are free",
+            "choose a smaller --size",
+        )
+
+
+def _free_memory() -> int | None:
+    """Bytes that may still be used without swapping; None where the system does not tell."""
+    free = None
+    if (meminfo := Path("/proc/meminfo")).exists():
+        found = re.search(r"^MemAvailable:\s*(\d+) kB$", meminfo.read_text(encoding="ascii"), re.MULTILINE)
+        free = int(found[1]) * 1024 if found else None
+    limit = Path("/sys/fs/cgroup/memory.max")  # a container's, if this is one: "max" or a number of bytes
+    if limit.exists() and (text := limit.read_text(encoding="ascii").strip()).isdigit():
+        free = int(text) if free is None else min(free, int(text))
+    return free

@@ -58,7 +58,8 @@ class CompiledScene:
     nothing is textured).
     ``base_color``, ``emission`` (M, 3) float32; ``material_info`` (M, 3) int32: base texture, emission texture, double
     sided. ``prev_triangles`` (moving, RECORD) float32: the moving ones one frame ago.
-    ``static_count``: number of triangles that never move.
+    ``static_count``: number of triangles that never move. Arrays of moving triangles are rewritten for every frame: one
+    tracer per compiled scene.
     """
 
     scene: Scene

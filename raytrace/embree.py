@@ -18,8 +18,10 @@ def open_caster(triangles: F32, static_count: int, backend: str = "auto") -> Ray
     """A caster for ``triangles`` (T, >= 9) float32, the first ``static_count`` of which never move.
 
     ``backend``: "native", "run", or "auto" for the first that works here.
-    Raises RuntimeError when "native" is asked for by name and cannot be had.
+    Raises ValueError for any other, RuntimeError when "native" is asked for by name and cannot be had.
     """
+    if backend not in BACKENDS:
+        raise ValueError(f"backend {backend!r}: must be one of {', '.join(BACKENDS)}")
     if backend != "run":
         library = load_library()
         if not isinstance(library, str):

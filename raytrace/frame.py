@@ -27,8 +27,8 @@ class FramePacket:
 
     ``albedo`` (H, W, 4): rgb in [0, 1], the divisor above; a = 1 on surfaces, 0 on misses.
     ``emission`` (H, W, 4): rgb = radiance emitted by the surface seen, or of the sky on a miss; a unused (1).
-    ``surface`` (H, W, 4): xyz = shading normal, world space, unit, towards the camera; w = depth along the camera's
-    forward axis, > 0, scene units. All 0 on a miss.
+    ``surface`` (H, W, 4): xyz = unit shading normal, world space, of the side that faces the camera; w = depth along
+    the camera's forward axis, > 0, scene units. All 0 on a miss.
     ``gradient`` (H, W, 2): d depth / d pixel in x and y of the tangent plane, scene units; 0 on a miss.
     ``motion`` (H, W, 4): xy = previous uv minus uv; z = depth the surface point had in the previous frame (<= 0: it was
     behind the camera; on a miss 0); w = object id, MISS on a miss. Unjittered; exactly 0 where nothing moves.

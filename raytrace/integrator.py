@@ -32,8 +32,8 @@ I32 = NDArray[np.int32]
 U32 = NDArray[np.uint32]
 
 REFERENCE_SEED = 0x5EED0000
-"""Added to the run's seed for references, whose frame numbers moreover start at 2^31: no path is shared with a
-frame."""
+"""Added to the run's seed for references, whose frame numbers moreover start at 2^31: they draw other numbers than any
+frame does."""
 
 
 @dataclass(frozen=True)
@@ -260,8 +260,8 @@ class Tracer:
     ) -> tuple[F64, F64]:
         """Plain means of ``samples`` independent paths per pixel: direct and indirect, (H, W, 3) float64, demodulated.
 
-        Uncycled hash numbers that no frame of this or another run uses; no clamp, no regularisation. Means over
-        disjoint ranges of ``first_sample`` may be averaged.
+        Uncycled hash numbers under a seed of their own; no clamp, no regularisation. Means over disjoint
+        ranges of ``first_sample`` may be averaged.
         """
         self.set_time(now, now)
         view, _ = self._views(camera, camera, size)

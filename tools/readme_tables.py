@@ -1,11 +1,10 @@
 """Writes the generated parts of README.md: keys, parameters, presets, and what `app.py bench` measured.
 
-    python -m tools.readme_tables                             keys, parameters and presets
-    python -m tools.readme_tables out/bench.json [MORE ...]   the measured table as well
-    python -m tools.readme_tables --check                     write nothing; exit code 1 if a part is out of date
+    python -m tools.readme_tables                  keys, parameters and presets
+    python -m tools.readme_tables out/bench.json   the measured table as well
+    python -m tools.readme_tables --check          write nothing; exit code 1 if a part is out of date
 
-A part lies between ``<!-- name:start -->`` and ``<!-- name:end -->``; nothing else is touched. Further reports must be
-of the same frames and the same machine, with another SVGF preset: their SVGF rows are put beside those of the first.
+A part lies between ``<!-- name:start -->`` and ``<!-- name:end -->``; nothing else is touched.
 """
 
 from __future__ import annotations
@@ -23,9 +22,6 @@ from errors import UserError
 from ui import keys
 
 README: Final = Path(__file__).resolve().parent.parent / "README.md"
-
-FILTERED: Final = "SVGF"
-"""What the names of the benchmark's methods begin with that depend on the preset."""
 
 Report = dict[str, Any]
 """The JSON that :func:`bench.report.write_json` writes."""
@@ -63,56 +59,37 @@ def _loaded(section: str, preset: str) -> config.Config:
     return config.load(None, (f"{section}.preset={preset}",))
 
 
-def measured(reports: Sequence[Report]) -> str:
-    """Machine, error and time of the methods, and the tracer's speed, of one or several reports of ``app.py bench``.
+def measured(report: Report) -> str:
+    """Machine, error and time of the methods, and the tracer's speed, of one report of ``app.py bench``.
 
-    Raises UserError for quick runs, and for reports of different frames, of different machines or of one preset.
+    Raises UserError for a quick run.
     """
-    first = reports[0]
-    labels = [str(report["config"]["svgf"]["preset"]) for report in reports]
-    if any(report["quick"] for report in reports):
+    if report["quick"]:
         raise UserError("a report of bench --quick: its numbers mean nothing", "measure without --quick")
-    if len(set(labels)) < len(labels):
-        raise UserError(f"reports of the same preset ({', '.join(labels)})", "give one report for each preset")
-    if any(_circumstances(report) != _circumstances(first) for report in reports):
-        raise UserError(
-            "the reports are of different machines, frames or references", "measure them on one machine, one by one"
-        )
-    machine, render = first["machine"], first["config"]["render"]
+    machine, preset, seed = report["machine"], report["config"]["svgf"]["preset"], report["config"]["render"]["seed"]
     packages = ", ".join(f"{name} {number}" for name, number in machine["packages"].items())
-    parts = [
+    circumstances = (
         f"{machine['renderer']} (OpenGL {machine['opengl']}); {machine['cpu']}, {machine['threads']} threads; "
-        f"{machine['system']}; Python {machine['python']}, {packages}. Seed {render['seed']}, {machine['date'][:10]}."
-    ]
-    for index, quality in enumerate(first["quality"]):
-        parts.append(_quality([report["quality"][index] for report in reports], labels))
-    parts.append(_tracing(first["tracing"]))
-    return "\n\n".join(parts)
-
-
-def _circumstances(report: Report) -> object:
-    """What must agree for numbers to stand in one table."""
-    machine = {key: value for key, value in report["machine"].items() if key != "date"}
-    frames = [[q[key] for key in ("scene", "motion", "size", "samples")] for q in report["quality"]]
-    return machine, frames, report["config"]["render"]["seed"]
-
-
-def _quality(results: Sequence[Report], labels: Sequence[str]) -> str:
-    """One sequence: all methods of the first result, then the filtered ones of the others."""
-    rows = []
-    for number, (result, label) in enumerate(zip(results, labels, strict=True)):
-        for m in result["methods"]:
-            filtered = m["name"].startswith(FILTERED)
-            if number == 0 or filtered:
-                name = f"{m['name']}, `{label}`" if filtered else m["name"]
-                errors = [m[key] for key in ("rmse", "rmse_ratio", "temporal", "temporal_ratio")]
-                rows.append((name, _number(m["milliseconds"], 1), *(_number(error, 4) for error in errors)))
-    first = results[0]
-    rows.append(
-        ("noise of the reference", "", _number(first["noise"], 4), "", _number(first["temporal_noise"], 4), "")
+        f"{machine['system']}; Python {machine['python']}, {packages}. "
+        f"Preset `{preset}` unless said otherwise, seed {seed}, {machine['date'][:10]}."
     )
+    return "\n\n".join([circumstances, *map(_quality, report["quality"]), _tracing(report["tracing"])])
+
+
+def _quality(result: Report) -> str:
+    """Time and error of every method of one sequence."""
+    rows = [
+        (
+            m["name"],
+            _number(m["milliseconds"], 1),
+            *(_number(m[key], 4) for key in ("rmse", "rmse_ratio", "temporal", "temporal_ratio")),
+        )
+        for m in result["methods"]
+    ]
+    noise, temporal_noise = _number(result["noise"], 4), _number(result["temporal_noise"], 4)
+    rows.append(("noise of the reference", "", noise, "", temporal_noise, ""))
     heads = ("method", "ms per frame", "RMSE", "of noisy", "temporal error", "of noisy")
-    title = f"`{first['scene']}`, {first['motion']}, {_size(first)}, references of {first['samples']} paths per pixel:"
+    title = f"`{result['scene']}`, {result['motion']}, {_size(result)}, against {result['samples']} paths per pixel:"
     return f"{title}\n\n{table(heads, rows, numbers=5)}"
 
 
@@ -167,7 +144,7 @@ def updated(text: str, parts: Mapping[str, str]) -> str:
 
 def build_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="readme_tables", description="Write the generated parts of README.md.")
-    parser.add_argument("reports", nargs="*", type=Path, metavar="JSON", help="what app.py bench wrote")
+    parser.add_argument("report", nargs="?", type=Path, metavar="JSON", help="what app.py bench wrote")
     parser.add_argument("--check", action="store_true", help="write nothing; exit code 1 if a part is out of date")
     return parser
 
@@ -176,8 +153,8 @@ def run(argv: Sequence[str], readme: Path = README) -> int:
     """Returns the exit code. Raises UserError."""
     args = build_parser().parse_args(argv)
     parts = {"keys": keys.markdown(), "parameters": parameters(), "presets": presets()}
-    if args.reports:
-        parts["bench"] = measured([read_report(path) for path in args.reports])
+    if args.report:
+        parts["bench"] = measured(read_report(args.report))
     before = readme.read_text(encoding="utf-8")
     after = updated(before, parts)
     if args.check:

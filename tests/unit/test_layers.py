@@ -44,7 +44,7 @@ LAYERS = [
     layer("ui", "ui gl raytrace config errors", EMBREE),
     layer("bench", "assets bench gl raytrace config errors", OPENGL | WINDOWS | {"embreex"}),
     layer("app.py", "assets bench config doctor errors gl raytrace ui", OPENGL | EMBREE | WINDOWS),
-    layer("tools", "tools assets bench config errors gl raytrace", WINDOWS),
+    layer("tools", "tools assets bench config errors gl raytrace ui.keys", WINDOWS),
 ]
 
 
