@@ -79,6 +79,9 @@ def main() -> int:
     except UserError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
+    except PermissionError as error:  # merely asking whether a file is there may be refused
+        print(f"error: {error.filename}: {error.strerror}", file=sys.stderr)
+        return 2
     except MemoryError as error:
         print(f"error: out of memory ({error})\n  choose a smaller --size, or close other programs", file=sys.stderr)
         return 2

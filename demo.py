@@ -25,9 +25,9 @@ from session import open_shot
 U8 = NDArray[np.uint8]
 
 FIRST = 30
-FRAMES = 8
-"""The picture shows the last of these frames, a second into the flight. By then the filter weighs a new frame as it
-always will; more of them would only let the picture wait."""
+FRAMES = 6
+"""The picture shows the last of these frames, a second into the flight. The filter weighs a new frame as it always will
+from the fifth on: more of them would only let the picture wait."""
 
 SAMPLES = 64
 """Paths per pixel of the reference."""
