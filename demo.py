@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.metrics import rmse
-from bench.storage import require_writable
 from config import Config
 from console import Progress, table
 from gl.renderer import Renderer, read
@@ -21,6 +20,7 @@ from images import side_by_side, write_apng, write_png
 from raytrace.frame import FramePacket
 from raytrace.shot import FPS, Shot
 from session import open_shot
+from storage import require_writable
 
 U8 = NDArray[np.uint8]
 

@@ -223,14 +223,21 @@ def _probe_numba() -> Facts:
 def _probe_window() -> Facts:
     import glfw
 
-    glfw.ERROR_REPORTING = "exception"
+    def reason() -> str:
+        _, text = glfw.get_error()
+        return text.decode(errors="replace") if text else "no reason given"
+
+    glfw.ERROR_REPORTING = "ignore"  # as exceptions the messages would be bytes
     if not glfw.init():
-        raise RuntimeError("glfw does not initialise")
+        raise RuntimeError(reason())
     glfw.window_hint(glfw.VISIBLE, False)
     glfw.window_hint(glfw.CONTEXT_VERSION_MAJOR, OLDEST_GL // 100)
     glfw.window_hint(glfw.CONTEXT_VERSION_MINOR, OLDEST_GL // 10 % 10)
     glfw.window_hint(glfw.OPENGL_PROFILE, glfw.OPENGL_CORE_PROFILE)
-    glfw.destroy_window(glfw.create_window(64, 64, "doctor", None, None))
+    window = glfw.create_window(64, 64, "doctor", None, None)
+    if not window:
+        raise RuntimeError(reason())
+    glfw.destroy_window(window)
     version = ".".join(map(str, glfw.get_version()))
     platform = {glfw.PLATFORM_X11: "X11", glfw.PLATFORM_WAYLAND: "Wayland"}.get(glfw.get_platform(), "other platform")
     glfw.terminate()

@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.storage import require_writable
 from config import Config
 from console import Progress
 from errors import UserError, did_you_mean
@@ -23,6 +22,7 @@ from images import to_srgb8, write_exr, write_png
 from raytrace.frame import FramePacket
 from raytrace.shot import Shot, modulate
 from session import open_shot
+from storage import require_writable
 
 F32 = NDArray[np.float32]
 U8 = NDArray[np.uint8]

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +11,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from errors import UserError
+from storage import replace_file
 
 F32 = NDArray[np.float32]
 U8 = NDArray[np.uint8]
@@ -25,34 +24,15 @@ def to_srgb8(linear: NDArray[np.floating]) -> U8:
     return np.rint(srgb * 255.0).astype(np.uint8)
 
 
-def _write(path: Path, save: Callable[[Path], object]) -> None:
-    """Save to a temporary neighbour and move it into place, so that a failure never costs a picture already there."""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(prefix=f".{path.stem}.", suffix=path.suffix, dir=path.parent)
-        os.close(handle)
-        temporary = Path(name)
-        try:
-            save(temporary)
-            temporary.chmod(0o644)
-            temporary.replace(path)
-        finally:
-            temporary.unlink(missing_ok=True)
-    except OSError as error:
-        raise UserError(
-            f"{path}: cannot be written ({error.strerror or error})", "choose another place with --out"
-        ) from error
-
-
 def write_png(path: Path, pixels: U8) -> None:
     """``pixels`` (H, W, 3) uint8. Missing folders are created. Raises UserError where that or writing fails."""
-    _write(path, lambda target: Image.fromarray(pixels[::-1]).save(target, format="PNG"))
+    replace_file(path, lambda target: Image.fromarray(pixels[::-1]).save(target, format="PNG"))
 
 
 def write_apng(path: Path, frames: Sequence[U8], milliseconds: int) -> None:
     """Animated PNG of ``frames`` (H, W, 3) uint8, endless, each shown for ``milliseconds``."""
     images = [Image.fromarray(frame[::-1]) for frame in frames]
-    _write(
+    replace_file(
         path,
         lambda target: images[0].save(
             target, format="PNG", save_all=True, append_images=images[1:], duration=milliseconds, loop=0
@@ -71,7 +51,7 @@ def write_exr(path: Path, values: F32) -> None:
         except (RuntimeError, ValueError) as error:
             raise OSError(str(error)) from error
 
-    _write(path, save)
+    replace_file(path, save)
 
 
 def read_exr(path: Path) -> F32:

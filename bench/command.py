@@ -12,11 +12,11 @@ from bench.cases import FULL, QUICK, SCORED, Case, Effort, quality_case, quick_s
 from bench.machine import describe
 from bench.methods import NewRenderer, QualityResult, Truth
 from bench.references import FOLDER, ReferenceCache
-from bench.storage import require_writable
 from config import Config
 from gl.context import create_headless
 from gl.renderer import Renderer
 from raytrace.shot import Shot
+from storage import require_writable
 
 _MEMORY_SIZE = (160, 90)
 

@@ -21,10 +21,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.metrics import Mask, temporal_difference
-from bench.storage import replace_file
 from console import Progress
 from raytrace.frame import FramePacket
 from raytrace.shot import Shot
+from storage import replace_file
 
 F64 = NDArray[np.float64]
 

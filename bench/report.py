@@ -13,10 +13,10 @@ from typing import Any
 from bench.machine import Machine
 from bench.memory import MemoryResult
 from bench.methods import APART_TAA, ONE_SIGNAL_TAA, MethodResult, QualityResult
-from bench.storage import replace_file
 from bench.tracing import TracingResult
 from config import Config
 from console import table
+from storage import replace_file
 
 DEVIATION = 0.1
 """How far the passes' sum may be from the frame."""

@@ -19,13 +19,13 @@ from bench.machine import describe
 from bench.methods import METHODS, NOISY, MethodResult, PassTime, QualityResult, Score, Truth
 from bench.references import Reference
 from bench.report import GOALS, Report
-from bench.storage import replace_file, require_writable
 from bench.timing import Summary
 from config import Config
 from errors import UserError
 from gl.renderer import Renderer
 from raytrace.frame import FramePacket
 from raytrace.shot import Shot
+from storage import replace_file, require_writable
 
 CONFIG = Config()
 SMALL = replace(CONFIG, render=replace(CONFIG.render, width=80, height=45))

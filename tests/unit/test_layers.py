@@ -11,7 +11,9 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-OURS = {"app", "assets", "bench", "config", "doctor", "errors", "gl", "raytrace", "tests", "tools", "ui"}
+COMMANDS = {"app", "cli", "demo", "doctor", "headless", "session"}
+HELPERS = {"config", "console", "errors", "images", "storage"}
+OURS = COMMANDS | HELPERS | {"assets", "bench", "gl", "raytrace", "tests", "tools", "ui"}
 OPENGL = {"moderngl", "glcontext", "OpenGL"}
 EMBREE = {"embreex", "trimesh"}
 WINDOWS = {"glfw", "imgui_bundle"}
@@ -41,10 +43,10 @@ LAYERS = [
     layer("assets", "assets raytrace errors", OPENGL | EMBREE | WINDOWS),
     layer("raytrace", "raytrace config errors", OPENGL | WINDOWS),
     layer("gl", "gl raytrace.frame config errors", EMBREE | WINDOWS),
-    layer("ui", "ui gl raytrace config errors", EMBREE),
-    layer("bench", "assets bench gl raytrace config errors", OPENGL | WINDOWS | {"embreex"}),
-    layer("app.py", "assets bench config doctor errors gl raytrace ui", OPENGL | EMBREE | WINDOWS),
-    layer("tools", "tools assets bench config errors gl raytrace ui.keys", WINDOWS),
+    layer("ui", "ui gl raytrace config console errors images session", EMBREE),
+    layer("bench", "assets bench gl raytrace config console errors session storage", OPENGL | WINDOWS | {"embreex"}),
+    layer("app.py", "assets bench cli config demo doctor errors gl headless raytrace ui", OPENGL | EMBREE | WINDOWS),
+    layer("tools", "tools assets bench cli config errors gl images raytrace session ui.keys", WINDOWS),
 ]
 
 

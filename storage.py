@@ -29,15 +29,15 @@ def replace_file(path: Path, save: Callable[[Path], object]) -> None:
             temporary.unlink(missing_ok=True)
     except OSError as error:
         raise UserError(
-            f"{path}: cannot be written ({error.strerror or error})", "check the folder's permissions"
+            f"{path}: cannot be written ({error.strerror or error})", "choose another place with --out"
         ) from error
 
 
 def require_writable(path: Path) -> None:
     """Raises UserError unless a file can be written at ``path``: to be asked before the work, not after it."""
-    if path.is_dir():
-        raise UserError(f"{path}: is a folder", "name a file")
     try:
+        if path.is_dir():
+            raise UserError(f"{path}: is a folder", "name a file")
         path.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=path.parent):
             pass
