@@ -17,6 +17,7 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from tools import setup
 
@@ -224,8 +225,8 @@ def _probe_window() -> Facts:
     import glfw
 
     def reason() -> str:
-        _, text = glfw.get_error()
-        return text.decode(errors="replace") if text else "no reason given"
+        text: Any = glfw.get_error()[1]
+        return bytes(text).decode(errors="replace") if text else "no reason given"  # bytes, whatever its stub says
 
     glfw.ERROR_REPORTING = "ignore"  # as exceptions the messages would be bytes
     if not glfw.init():
