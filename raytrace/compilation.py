@@ -48,3 +48,9 @@ def device(function: Callable[..., Any]) -> Compiled:
     """A function that kernels call."""
     compiled: Compiled = njit(**_options)(function)
     return compiled
+
+
+def inlined(function: Callable[..., Any]) -> Compiled:
+    """A device function that takes a scene's tables: always inlined, since a call would copy a kilobyte of pointers."""
+    compiled: Compiled = njit(inline="always", **_options)(function)
+    return compiled

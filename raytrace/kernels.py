@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import uint32
 
-from raytrace.compilation import device, kernel
+from raytrace.compilation import device, inlined, kernel
 from raytrace.compiled import FACE_NORMAL, LIGHT, MATERIAL, NORMALS, OBJECT, OFFSET, SMOOTH, CompiledScene
 from raytrace.sampling import (
     PAIR_BOUNCE,
@@ -131,7 +131,7 @@ def _shading_normal(record, smooth, u, v):  # type: ignore[no-untyped-def]
     return x * scale, y * scale, z * scale
 
 
-@device
+@inlined
 def _surface_color(textured, tables, column, factor, triangle, material, u, v, footprint):  # type: ignore[no-untyped-def]
     """Factor times texture (column 0: base colour, 1: emission) for a footprint in scene units."""
     r, g, b = factor[material, 0], factor[material, 1], factor[material, 2]
@@ -149,7 +149,7 @@ def _surface_color(textured, tables, column, factor, triangle, material, u, v, f
     return r, g, b
 
 
-@device
+@inlined
 def _light_sample(textured, has_sky, tables, px, py, pz, nx, ny, nz, gx, gy, gz, offset, u, v, choice, mis):  # type: ignore[no-untyped-def]
     """One light sample at p: shadow ray direction (its length is the segment) and radiance·cos/(π·pdf).
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from raytrace.compilation import device
+from raytrace.compilation import device, inlined
 from raytrace.scene import Texture
 
 F64 = NDArray[np.float64]
@@ -113,7 +113,7 @@ def level_for(footprint_texels):  # type: ignore[no-untyped-def]
     return int(min(math.log2(footprint_texels) + _HALF, _COARSEST))  # infinity has no integer: limit first
 
 
-@device
+@inlined
 def lookup(texels, levels, decode, index, u, v, level):  # type: ignore[no-untyped-def]
     """Bilinear, repeated lookup at a mip level: three linear float32."""
     offset, width, height = levels[index, level, 0], levels[index, level, 1], levels[index, level, 2]
