@@ -2,7 +2,7 @@
 //
 // STEP: distance of the taps. SIGMA_N_SQUARINGS: log2 of the normal exponent, or -1 where it is no power of two.
 // LUMINANCE_STOP: 0 leaves out w_l. RAW: in_color is a sample that no pass has looked at yet.
-// The taps are written out: constants then fold, and a software rasteriser takes 0.6 of the time of a loop.
+// The taps are written out, so that constants fold.
 
 #include "common/color.glsl"
 #include "common/finite.glsl"
