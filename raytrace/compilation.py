@@ -15,7 +15,18 @@ from numba import config, njit
 
 Compiled = Callable[..., Any]
 
-SOURCES = ("casting", "compilation", "compiled", "embree_native", "embree_run", "kernels", "sampling", "textures")
+SOURCES = (
+    "casting",
+    "compilation",
+    "compiled",
+    "embree_native",
+    "embree_run",
+    "guides",
+    "kernels",
+    "sampling",
+    "tables",
+    "textures",
+)
 """Modules of this package whose functions and constants go into machine code."""
 
 

@@ -23,8 +23,10 @@ from raytrace.camera import Camera
 from raytrace.compiled import OBJECT, CompiledScene
 from raytrace.embree import open_caster
 from raytrace.frame import FramePacket
-from raytrace.kernels import SHADOW_END, Outputs, Variant
+from raytrace.guides import Outputs, camera_rays, guide_kernel
+from raytrace.kernels import SHADOW_END
 from raytrace.sampling import HALTON, HASH
+from raytrace.tables import Variant, tables_of, variant_of
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -119,10 +121,10 @@ class Tracer:
     def __init__(self, scene: CompiledScene, settings: Settings | None = None) -> None:
         self.scene = scene
         self.settings = settings or Settings()
-        self.variant: Variant = kernels.variant_of(scene)
+        self.variant: Variant = variant_of(scene)
         self.rays = open_caster(scene.triangles, scene.static_count, self.settings.backend)
-        self.tables = kernels.tables_of(scene)
-        self._guides = kernels.guide_kernel(self.variant, self.settings.positions)
+        self.tables = tables_of(scene)
+        self._guides = guide_kernel(self.variant, self.settings.positions)
         self._first_hit = kernels.first_hit_kernel(self.variant)
         self._second_hit = kernels.second_hit_kernel(self.variant)
         self._scratch = _Scratch()
@@ -167,9 +169,7 @@ class Tracer:
         scratch = self._scratch
         scratch.reserve(count)
         origins, directions = scratch.origins[:count], scratch.directions[:count]
-        kernels.camera_rays(
-            pixels, *view.size, view.eye, view.right, view.up, view.forward, view.jitter, origins, directions
-        )
+        camera_rays(pixels, *view.size, view.eye, view.right, view.up, view.forward, view.jitter, origins, directions)
         if whole_rows:
             triangle, u, v = self.rays.intersect_rows(origins, directions, view.size[0])
         else:

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from errors import UserError
 from raytrace.camera import Camera
+from raytrace.guides import camera_rays
 from raytrace.integrator import View
-from raytrace.kernels import camera_rays
 from raytrace.shot import jitter_of, read_camera_path
 from tests.tracer.scenes import placed_camera
 

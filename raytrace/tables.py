@@ -1,0 +1,123 @@
+"""A compiled scene as compiled loops take it, and what they all read from it: points, normals, colours.
+
+Each kernel exists in as many variants as there are combinations of the scene's features (:class:`Variant`); what a
+scene lacks is compiled out. Variants are built on demand and cached on disk by Numba.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from raytrace.compilation import device, inlined
+from raytrace.compiled import FACE_NORMAL, NORMALS, CompiledScene
+from raytrace.textures import SRGB_TO_LINEAR, level_for, lookup
+
+_ZERO, _ONE = np.float32(0.0), np.float32(1.0)
+
+
+class Tables(NamedTuple):
+    """The arrays of a :class:`CompiledScene` in the form that kernels take."""
+
+    triangles: Any
+    info: Any
+    uvs: Any
+    uv_density: Any
+    base_color: Any
+    emission: Any
+    material_info: Any
+    texels: Any
+    levels: Any
+    decode: Any
+    light_triangles: Any
+    light_threshold: Any
+    light_alias: Any
+    light_pdf: Any
+    light_density: Any
+    sky: Any
+    far: Any
+    """Length of a shadow ray to the sky: out of the scene from anywhere in it, in its own units."""
+    prev_triangles: Any
+    static_count: int
+
+
+class Variant(NamedTuple):
+    """What the scene needs compiled in."""
+
+    textured: bool
+    sky: bool
+    moving: bool
+
+
+def tables_of(scene: CompiledScene) -> Tables:
+    lights = scene.lights
+    return Tables(
+        scene.triangles,
+        scene.triangle_info,
+        scene.triangle_uvs,
+        scene.uv_density,
+        scene.base_color,
+        scene.emission,
+        scene.material_info,
+        scene.textures.texels,
+        scene.textures.levels,
+        SRGB_TO_LINEAR,
+        lights.triangles,
+        lights.threshold,
+        lights.alias,
+        lights.pdf,
+        lights.density,
+        lights.sky,
+        np.float32(max(1e8, 8.0 * scene.extent)),
+        scene.prev_triangles,
+        scene.static_count,
+    )
+
+
+def variant_of(scene: CompiledScene) -> Variant:
+    return Variant(scene.has_textures, scene.lights.has_sky, scene.has_motion)
+
+
+@device
+def interpolate(record, first, u, v):  # type: ignore[no-untyped-def]
+    """Corner attributes at columns first .. first + 8 of one triangle record, at barycentrics u, v."""
+    w = _ONE - u - v
+    return (
+        w * record[first] + u * record[first + 3] + v * record[first + 6],
+        w * record[first + 1] + u * record[first + 4] + v * record[first + 7],
+        w * record[first + 2] + u * record[first + 5] + v * record[first + 8],
+    )
+
+
+@device
+def shading_normal(record, smooth, u, v):  # type: ignore[no-untyped-def]
+    """Unit shading normal; the face normal on flat triangles and where the vertex normals cancel."""
+    gx, gy, gz = record[FACE_NORMAL], record[FACE_NORMAL + 1], record[FACE_NORMAL + 2]
+    if smooth == 0:
+        return gx, gy, gz
+    x, y, z = interpolate(record, NORMALS, u, v)
+    square = x * x + y * y + z * z
+    if square <= _ZERO:
+        return gx, gy, gz
+    scale = _ONE / math.sqrt(square)
+    return x * scale, y * scale, z * scale
+
+
+@inlined
+def surface_color(textured, tables, column, factor, triangle, material, u, v, footprint):  # type: ignore[no-untyped-def]
+    """Factor times texture (column 0: base colour, 1: emission) for a footprint in scene units."""
+    r, g, b = factor[material, 0], factor[material, 1], factor[material, 2]
+    if textured:
+        index = tables.material_info[material, column]
+        if index >= 0:
+            c = tables.uvs[triangle]
+            w = _ONE - u - v
+            s = w * c[0] + u * c[2] + v * c[4]
+            t = w * c[1] + u * c[3] + v * c[5]
+            size = math.sqrt(np.float32(tables.levels[index, 0, 1]) * np.float32(tables.levels[index, 0, 2]))
+            level = level_for(footprint * tables.uv_density[triangle] * size)
+            tr, tg, tb = lookup(tables.texels, tables.levels, tables.decode, index, s, t, level)
+            r, g, b = r * tr, g * tg, b * tb
+    return r, g, b
