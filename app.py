@@ -49,7 +49,11 @@ def run(argv: Sequence[str]) -> int:
     if args.command == "graph":
         import headless
 
-        headless.print_graph(config, args.denoiser, args.dot, args.animate)
+        headless.print_graph(config, args.denoiser, args.dot, args.animate, args.scene)
+    elif args.command == "explain":
+        import explain
+
+        explain.run(config, args.scene, args.denoiser, args.animate, args.jitter)
     elif args.command == "render":
         import headless
 
@@ -61,7 +65,19 @@ def run(argv: Sequence[str]) -> int:
     elif has_display():
         from ui import window
 
-        window.run(config, args.scene, args.denoiser, args.camera or "still", not args.no_animate, args.out)
+        window.run(
+            config,
+            window.Wishes(
+                scene=args.scene,
+                denoiser=args.denoiser,
+                camera=args.camera or "still",
+                animate=not args.no_animate,
+                out=args.out,
+                hud=not args.no_hud,
+                calibrate=args.size is None,
+                log=args.log,
+            ),
+        )
     else:
         import demo
 

@@ -14,7 +14,7 @@ from typing import Any, NoReturn
 from errors import UserError, did_you_mean
 
 ROOT = Path(__file__).resolve().parent
-DENOISERS = ("none", "accumulate", "svgf", "reference")
+DENOISERS = ("none", "accumulate", "svgf", "bmfr", "reference")
 LARGEST_SIDE = 16384
 SCENE_FILES = ".glb .gltf .obj .ply"
 
@@ -149,18 +149,22 @@ def window_parser() -> Parser:
     parser.usage = "app.py [FLAGS], or app.py COMMAND [FLAGS]"
     _add_scene(parser)
     _add_size(parser)
-    _add_denoiser(parser, DENOISERS[:3], "what the window begins with (default svgf)")
+    _add_denoiser(parser, DENOISERS[:-1], "what the window begins with (default svgf)")
     parser.add_argument(
         "--camera",
         metavar="C",
         help="still, flight (if the scene has one), or the file of a camera path; see app.py render --help. "
         "Default: still in the window, flight in the demo",
     )
+    parser.add_argument("--no-hud", action="store_true", help="begin without the panel over the picture; G shows it")
     parser.add_argument(
         "--no-animate", action="store_true", help="objects and lamps of the window's scene rest until Space is pressed"
     )
     parser.add_argument(
         "--out", type=Path, default=Path("out"), metavar="DIR", help="folder of screenshots and the demo (default out)"
+    )
+    parser.add_argument(
+        "--log", action="store_true", help="print what changes in the window: settings, passes of a frame, errors"
     )
     _add_seed(parser)
     _add_settings(parser)
@@ -249,7 +253,27 @@ def graph_parser() -> Parser:
     )
     _add_denoiser(parser, DENOISERS, "whose passes (default svgf)")
     parser.add_argument("--dot", action="store_true", help="as Graphviz instead of text")
+    parser.add_argument("--scene", metavar="S", help="as for this scene, whose objects move only with --animate")
     parser.add_argument("--animate", action="store_true", help="as in a scene in which objects move")
+    _add_settings(parser)
+    return parser
+
+
+def explain_parser() -> Parser:
+    parser = Parser(
+        "app.py explain",
+        "Print what a scene and a denoiser need, and why: the tracer's kernels and rays, images made and uploaded,\n"
+        "passes that are on and off with the settings that decide on them, bytes of every texture. Needs no GPU.",
+        "examples:\n"
+        "  app.py explain --scene interior --animate\n"
+        "  app.py explain --denoiser none\n"
+        "  app.py explain --size 1920x1080 --set svgf.separate=false",
+    )
+    _add_scene(parser)
+    _add_size(parser)
+    _add_denoiser(parser, DENOISERS, "whose passes (default svgf)")
+    parser.add_argument("--animate", action="store_true", help="objects and lamps move, where the scene has such")
+    parser.add_argument("--jitter", action="store_true", help="as with app.py render --jitter")
     _add_settings(parser)
     return parser
 
@@ -292,6 +316,7 @@ def doctor_parser() -> Parser:
 COMMANDS: dict[str, tuple[str, Callable[[], Parser]]] = {
     "render": ("render a picture without a window", render_parser),
     "graph": ("print the passes of one frame, as text or Graphviz", graph_parser),
+    "explain": ("say what a scene and a denoiser need, what it costs, and why", explain_parser),
     "bench": ("measure time and error of the denoisers", bench_parser),
     "scenes": ("list the scenes that come with the program", scenes_parser),
     "doctor": ("say what is missing on this machine, and what to do", doctor_parser),

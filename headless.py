@@ -18,10 +18,10 @@ from gl.context import create_headless
 from gl.executor import Result
 from gl.pipelines import FrameTraits, build
 from gl.renderer import Renderer, read
-from images import to_srgb8, write_exr, write_png
+from images import to_srgb8, viewable, write_exr, write_png
 from raytrace.frame import FramePacket
 from raytrace.shot import Shot, modulate
-from session import open_shot
+from session import find_scene, open_shot
 from storage import require_writable
 
 F32 = NDArray[np.float32]
@@ -191,28 +191,13 @@ def to_8bit(values: F32) -> U8:
     return (values[..., :3] * 255.0 + 0.5).astype(np.uint8)
 
 
-def viewable(values: F32) -> F32:
-    """(H, W, C) values of any range as (H, W, 3) in [0, 1]: one channel as grey, two with blue 0, scaled by range.
+def print_graph(config: Config, denoiser: str, dot: bool, moving: bool = False, scene: str | None = None) -> None:
+    """The compiled plan of one frame, as text or Graphviz.
 
-    The range includes 0 and leaves out the highest and the lowest hundredth; values in [0, 1] stay as they are.
+    ``moving``: as where objects move; with ``scene``, a scene or file, only if some of its objects can.
+    Raises UserError where there is no such scene.
     """
-    channels = values.shape[2]
-    if channels == 1:
-        rgb = np.repeat(values, 3, axis=2)
-    elif channels == 2:
-        rgb = np.concatenate([values, np.zeros_like(values[..., :1])], axis=2)
-    else:
-        rgb = values[..., :3]
-    finite = rgb[np.isfinite(rgb)]
-    if finite.size == 0:
-        return np.zeros_like(rgb)
-    low, high = min(0.0, float(np.percentile(finite, 1))), float(np.percentile(finite, 99))
-    if low >= 0.0 and high <= 1.0:
-        return rgb
-    return ((rgb - low) / max(high - low, 1e-9)).astype(np.float32)
-
-
-def print_graph(config: Config, denoiser: str, dot: bool, moving: bool = False) -> None:
-    """The compiled plan of one frame, as text or Graphviz."""
+    if scene is not None:
+        moving = find_scene(scene, moving).has_motion
     plan = build(config, denoiser, FrameTraits(moving=moving)).compile()
     print(plan.dot() if dot else plan.text())

@@ -24,6 +24,36 @@ def to_srgb8(linear: NDArray[np.floating]) -> U8:
     return np.rint(srgb * 255.0).astype(np.uint8)
 
 
+def value_range(values: NDArray[np.floating]) -> tuple[float, float]:
+    """The values to show as black and white, low < high: (0, 1) where that will do.
+
+    The range includes 0 and leaves out the highest and the lowest hundredth, and all that is NaN or infinite.
+    """
+    finite = values[np.isfinite(values)]
+    if finite.size == 0:
+        return 0.0, 1.0
+    low, high = min(0.0, float(np.percentile(finite, 1))), max(0.0, float(np.percentile(finite, 99)))
+    return (0.0, 1.0) if low >= 0.0 and high <= 1.0 else (low, max(high, low + 1e-9))
+
+
+def viewable(values: F32) -> F32:
+    """(H, W, C) values of any range as (H, W, 3): one channel as grey, two with blue 0, scaled by :func:`value_range`.
+
+    Values in [0, 1] stay as they are. Where nothing is finite all is 0.
+    """
+    channels = values.shape[2]
+    if channels == 1:
+        rgb = np.repeat(values, 3, axis=2)
+    elif channels == 2:
+        rgb = np.concatenate([values, np.zeros_like(values[..., :1])], axis=2)
+    else:
+        rgb = values[..., :3]
+    if not np.isfinite(rgb).any():
+        return np.zeros_like(rgb)
+    low, high = value_range(rgb)
+    return ((rgb - low) / (high - low)).astype(np.float32)
+
+
 def write_png(path: Path, pixels: U8) -> None:
     """``pixels`` (H, W, 3) uint8. Missing folders are created. Raises UserError where that or writing fails."""
     replace_file(path, lambda target: Image.fromarray(pixels[::-1]).save(target, format="PNG"))

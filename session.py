@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import re
 import sys
-import threading
+from contextlib import AbstractContextManager
 from pathlib import Path
+from typing import Protocol
 
 import assets
 from config import Config
 from console import Progress
 from errors import UserError, did_you_mean
 from raytrace.camera import Camera
+from raytrace.compile_events import watch_kernels
 from raytrace.compiled import CompiledScene, compile_scene
 from raytrace.integrator import Settings, Tracer
 from raytrace.sampling import HALTON, HASH
@@ -21,7 +23,36 @@ from raytrace.shot import Shot, read_camera_path
 BYTES_PER_PIXEL = 600
 """Main memory that a frame takes, textures included (a software renderer's are there too): measured with SVGF."""
 
-_SURE_TO_COMPILE = 2.0  # seconds; kernels from the disk are there within one
+
+class Log(Protocol):
+    """Who is told how far the opening of a scene is. Each may raise, which ends it."""
+
+    def stage(self, text: str) -> AbstractContextManager[object]:
+        """What is done while the ``with`` lasts: ``"interior: preparing 161,336 triangles"``."""
+
+    def compiling(self, kernel: str) -> None:
+        """A kernel of the tracer begins to be compiled, which takes seconds. On whatever thread needs it."""
+
+    def notice(self, text: str) -> None:
+        """What was repaired or approximated."""
+
+
+class Terminal:
+    """On stderr."""
+
+    def __init__(self) -> None:
+        self._told = False
+
+    def stage(self, text: str) -> Progress:
+        return Progress(text)
+
+    def compiling(self, kernel: str) -> None:
+        if not self._told:
+            self.notice("compiling the tracer's kernels, once for each kind of scene ...")
+        self._told = True
+
+    def notice(self, text: str) -> None:
+        print(text, file=sys.stderr, flush=True)
 
 
 def find_scene(name: str, animate: bool) -> Scene:
@@ -38,9 +69,11 @@ def find_scene(name: str, animate: bool) -> Scene:
     )
 
 
-def open_tracer(scene: Scene, config: Config, positions: bool = False) -> tuple[CompiledScene, Tracer]:
-    """Compile ``scene`` and the kernels it needs, with a line of progress if that takes a while."""
-    with Progress(f"{scene.name}: preparing {scene.triangle_count:,} triangles"):
+def prepare_tracer(
+    scene: Scene, config: Config, positions: bool = False, log: Log | None = None
+) -> tuple[CompiledScene, Tracer]:
+    """Compile ``scene``, with a line of progress if that takes a while; its kernels are chosen, but not compiled."""
+    with (log or Terminal()).stage(f"{scene.name}: preparing {scene.triangle_count:,} triangles"):
         compiled = compile_scene(scene)
     render = config.render
     settings = Settings(
@@ -50,40 +83,56 @@ def open_tracer(scene: Scene, config: Config, positions: bool = False) -> tuple[
         tile=render.tile,
         positions=positions,
     )
-    tracer = Tracer(compiled, settings)
-    text = "compiling the tracer's kernels, once for each kind of scene ..."
-    late = threading.Timer(_SURE_TO_COMPILE, lambda: print(text, file=sys.stderr, flush=True))
-    late.daemon = True
-    late.start()
+    return compiled, Tracer(compiled, settings)
+
+
+def open_tracer(
+    scene: Scene, config: Config, positions: bool = False, log: Log | None = None
+) -> tuple[CompiledScene, Tracer]:
+    """Compile ``scene`` and the kernels it needs, with a line of progress if that takes a while."""
+    log = log or Terminal()
+    compiled, tracer = prepare_tracer(scene, config, positions, log)
     try:
-        tracer.warm_up()
-    finally:
-        late.cancel()
+        with watch_kernels(log.compiling):
+            tracer.warm_up()
+    except BaseException:
+        tracer.close()
+        raise
     return compiled, tracer
 
 
-def open_shot(name: str, config: Config, camera: str | None, animate: bool, jitter: bool = False) -> Shot:
-    """Everything between a scene's name and its frames. Notices of the loader go to stderr.
+def open_shot(
+    name: str, config: Config, camera: str | None, animate: bool, jitter: bool = False, log: Log | None = None
+) -> Shot:
+    """Everything between a scene's name and its frames. Progress and the loader's notices go to ``log``, or to stderr.
 
     ``camera``: "still", "flight", the path of a camera path in JSON, or None for the flight if the scene has one.
     Raises UserError for a scene or camera that cannot be had, and for a picture that memory has no room for.
     """
+    log = log or Terminal()
     size = config.render.width, config.render.height
     require_memory(size)
     path = None if camera is None else _camera_path(camera)
-    scene = find_scene(name, animate)
-    for notice in scene.notices:
-        print(f"{scene.name}: {notice}", file=sys.stderr)
-    if animate and not scene.has_motion:
-        print(f"{scene.name}: nothing in this scene moves", file=sys.stderr)
+    with log.stage(f"{Path(name).name}: reading"):
+        scene = find_scene(name, animate)
+    tell_notices(scene, animate, log)
     if path is None:
         path = "still" if scene.flight is None else "flight"
     if path == "flight" and scene.flight is None:
         raise UserError(
             f"--camera flight: {scene.name} has no flight", "use --camera still, or a camera path: --camera path.json"
         )
-    compiled, tracer = open_tracer(scene, config)
+    compiled, tracer = open_tracer(scene, config, log=log)
     return Shot(compiled, tracer, size, path, animate, jitter)
+
+
+def tell_notices(scene: Scene, animate: bool, log: Log | None = None) -> None:
+    """Tell what the loader has to say, and that nothing moves where ``animate`` asked for it."""
+    log = log or Terminal()
+    for notice in scene.notices:
+        log.notice(f"{scene.name}: {notice}")
+    if animate and not scene.has_motion:
+        log.notice(f"{scene.name}: nothing in this scene moves")
 
 
 def _camera_path(camera: str) -> str | list[Camera]:

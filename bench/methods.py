@@ -12,7 +12,6 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +20,7 @@ from bench.cases import FIRST_MEASURED, FRAMES, SCORED, SCORED_PAIRS
 from bench.metrics import Mask, pooled, rmse, temporal_difference
 from bench.references import Reference, temporal_noise
 from bench.timing import Summary
-from config import PRESETS, Config
+from config import Config, apply_preset
 from console import Progress
 from errors import UserError
 from gl.profiler import Profiler, is_software
@@ -50,10 +49,9 @@ class Method:
 
     def configure(self, config: Config) -> Config:
         """``config`` as this method needs it."""
-        svgf = config.svgf
         if self.preset:
-            values: dict[str, Any] = dict(PRESETS["svgf"][self.preset])
-            svgf = replace(svgf, preset=self.preset, **values)
+            config = apply_preset(config, "svgf", self.preset)
+        svgf = config.svgf
         if self.separate is not None:
             svgf = replace(svgf, separate=self.separate)
         return replace(config, svgf=svgf, taa=replace(config.taa, enabled=self.taa))
@@ -72,6 +70,7 @@ METHODS = (
     APART,
     APART_TAA,
     Method("SVGF as published", "svgf", separate=True, preset="paper"),
+    Method("SVGF, reference constants", "svgf", separate=False, preset="reference"),
 )
 
 

@@ -11,12 +11,13 @@ import moderngl
 
 from errors import did_you_mean
 from gl.formats import lookup
-from gl.plan import Node, Plan, Tex
+from gl.plan import History, Node, Plan, Tex, texture_size
 from gl.ports import ComputePass, GraphError
 from gl.profiler import Profiler
 from gl.programs import Program, Programs
 from gl.resources import VALID, Histories, Size, Slots, Textures
 from gl.shader import ShaderError
+from gl.variants import Variant, stand_in, variant
 
 SHADER_ROOT: Final = Path(__file__).parent / "shaders"
 
@@ -77,6 +78,7 @@ class Executor:
 
     def __init__(self, ctx: moderngl.Context, shader_root: Path = SHADER_ROOT) -> None:
         self._ctx = ctx
+        self.shader_root: Final = shader_root
         self._programs = Programs(ctx, shader_root)
         self._textures = Textures(ctx)
         self._slots = Slots(self._textures)
@@ -85,6 +87,7 @@ class Executor:
         # fails if ours is still the current one when it is released.
         self._idle = ctx.screen or ctx.detect_framebuffer(0)
         self._run = 0
+        self._prepared: dict[Variant, tuple[Node, Program]] = {}
 
     def run(
         self,
@@ -123,15 +126,57 @@ class Executor:
         outputs = {name: textures[tex] for name, tex in plan.outputs.items()}
         return Result(outputs, status, barriers, plan, textures)
 
+    def unprepared(self, variants: Mapping[Variant, Node]) -> dict[Variant, Node]:
+        """Those of ``variants`` that :meth:`prepare` was not called for, or whose program was replaced since."""
+        return {key: node for key, node in variants.items() if key not in self._prepared}
+
+    def prepare(self, node: Node, size: Size) -> None:
+        """Compile the program of ``node`` and draw with it once, into small textures of its own.
+
+        Then a run in frames of ``size`` meets nothing new: drivers finish a program when it first draws.
+
+        Raises:
+            GraphError: a uniform's value does not fit.
+            ShaderError: the shader cannot be used.
+        """
+        program = self._programs.get(node)
+        sources: dict[str, Tex | History] = {**node.reads, **node.prevs}
+        small = stand_in(size, {tex.divisor for tex in (*sources.values(), *node.writes.values())})
+        made: list[moderngl.Texture] = []
+
+        def texture(tex: Tex | History) -> moderngl.Texture:
+            made.append(self._textures.create(tex.fmt, texture_size(small, tex.divisor)))
+            return made[-1]
+
+        inputs = {port: texture(source) for port, source in sources.items()}
+        targets = [texture(target) for target in node.writes.values()]
+        self._ctx.enable_only(moderngl.NOTHING)
+        try:
+            self._draw(program, node, inputs, targets, valid=False)
+        finally:
+            self._idle.use()
+            for scratch in made:
+                self._textures.release(scratch)
+        self._prepared[variant(node, size)] = node, program
+
+    def shaders_changed(self) -> bool:
+        """Whether a shader file was written since they were last looked at for :meth:`reload_shaders`."""
+        return self._programs.changed()
+
     def reload_shaders(self) -> list[ShaderError]:
         """Compile again what has changed on disk. A program that fails stays as it was, and its error is returned."""
-        return self._programs.reload()
+        errors = self._programs.reload()
+        for key, (node, program) in list(self._prepared.items()):
+            if self._programs.get(node) is not program:
+                del self._prepared[key]
+        return errors
 
     def release(self) -> None:
         """Free all textures, framebuffers and programs. Results of earlier runs are void then."""
         self._histories.release()
         self._slots.release()
         self._programs.release()
+        self._prepared.clear()
 
     def _place(self, plan: Plan, size: Size, uploads: Mapping[str, moderngl.Texture]) -> dict[Tex, moderngl.Texture]:
         """The texture object behind every handle of the plan."""
@@ -158,15 +203,26 @@ class Executor:
 
     def _run_pass(self, node: Node, textures: Mapping[Tex, moderngl.Texture], status: Mapping[str, str]) -> int:
         """Run one pass and return the number of barriers it took."""
-        program = self._programs.get(node)
-        for unit, port in program.reads:
-            textures[node.reads[port]].use(unit)
-        for unit, port in program.prevs:
-            self._histories.read(node.prevs[port]).use(unit)
-        if program.history_flag is not None:
-            program.history_flag.value = all(status[history.name] == VALID for history in node.prevs.values())
-        program.set_uniforms(node)
+        inputs = {port: textures[tex] for port, tex in node.reads.items()}
+        inputs |= {port: self._histories.read(history) for port, history in node.prevs.items()}
         targets = [textures[tex] for tex in node.writes.values()]
+        valid = all(status[history.name] == VALID for history in node.prevs.values())
+        return self._draw(self._programs.get(node), node, inputs, targets, valid)
+
+    def _draw(
+        self,
+        program: Program,
+        node: Node,
+        inputs: Mapping[str, moderngl.Texture],
+        targets: list[moderngl.Texture],
+        valid: bool,
+    ) -> int:
+        """Bind ``inputs`` by port and run ``program`` into ``targets``; the number of barriers it took."""
+        for unit, port in program.samplers:
+            inputs[port].use(unit)
+        if program.history_flag is not None:
+            program.history_flag.value = valid
+        program.set_uniforms(node)
         if isinstance(node.work, ComputePass):
             return self._dispatch(program, node.work, targets)
         self._textures.framebuffer(targets).use()

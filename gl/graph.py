@@ -30,9 +30,10 @@ from functools import cache
 from errors import did_you_mean
 from gl.formats import lookup
 from gl.plan import IMPORT, History, Node, Plan, Tex, compile_plan
-from gl.ports import ComputePass, FragmentPass, GraphError, In, Out, Pass, Prev, Uniform
+from gl.ports import ONE_TEXEL, ComputePass, FragmentPass, GraphError, In, Out, Pass, Prev, Uniform
 
 __all__ = [
+    "ONE_TEXEL",
     "ComputePass",
     "FragmentPass",
     "Graph",

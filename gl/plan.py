@@ -11,7 +11,7 @@ from typing import Final, NamedTuple
 
 from errors import did_you_mean
 from gl.formats import FORMATS, INTEGER_FORMATS
-from gl.ports import GraphError, Pass
+from gl.ports import ONE_TEXEL, GraphError, Pass
 
 IMPORT: Final = -1
 """``Tex.producer`` of a texture that is uploaded, not written by a pass."""
@@ -78,6 +78,34 @@ class Slot(NamedTuple):
     rank: int
 
 
+class Memory(NamedTuple):
+    """What one texture object, or the pair of a history, takes on the GPU.
+
+    Attributes:
+        kind: ``"import"``, ``"slot"`` or ``"history"``.
+        names: what lies in it: the textures that take turns in a slot, in the order in which they are written.
+        size: width and height in texels.
+        copies: 2 for a history, whose halves change places, otherwise 1.
+        bytes: of all copies together.
+    """
+
+    kind: str
+    names: tuple[str, ...]
+    fmt: str
+    size: tuple[int, int]
+    copies: int
+    bytes: int
+
+    @staticmethod
+    def of(
+        kind: str, names: tuple[str, ...], fmt: str, divisor: int, frame: tuple[int, int], copies: int = 1
+    ) -> Memory:
+        """The row of a texture with ``divisor`` in a frame of that size."""
+        return Memory(
+            kind, names, fmt, texture_size(frame, divisor), copies, copies * texture_bytes(frame, fmt, divisor)
+        )
+
+
 @dataclass(frozen=True, slots=True)
 class Plan:
     """What the executor needs to run one frame. Made by :func:`compile_plan`, never changed afterwards.
@@ -102,15 +130,25 @@ class Plan:
     outputs: dict[str, Tex]
     keep: tuple[Tex, ...]
 
+    def memory(self, size: tuple[int, int]) -> tuple[Memory, ...]:
+        """The texture objects behind a frame of ``size`` (width, height): imports, then slots, then histories."""
+        held: list[list[str]] = [[] for _ in self.slots]
+        for tex, index in self.slot_of.items():
+            held[index].append(tex.name)
+        rows = [Memory.of("import", (tex.name,), tex.fmt, tex.divisor, size) for tex in self.imports]
+        rows += [
+            Memory.of("slot", tuple(names), slot.fmt, slot.divisor, size)
+            for slot, names in zip(self.slots, held, strict=True)
+        ]
+        rows += [
+            Memory.of("history", (history.name,), history.fmt, history.divisor, size, copies=2)
+            for history in self.feeds.values()
+        ]
+        return tuple(rows)
+
     def bytes(self, size: tuple[int, int]) -> int:
         """GPU memory in bytes that the plan's textures take at ``size`` (width, height), without the imports."""
-        specs = [(slot.fmt, slot.divisor, 1) for slot in self.slots]
-        specs += [(history.fmt, history.divisor, 2) for history in self.feeds.values()]
-        total = 0
-        for fmt, divisor, count in specs:
-            width, height = texture_size(size, divisor)
-            total += count * width * height * FORMATS[fmt].bytes_per_pixel
-        return total
+        return sum(row.bytes for row in self.memory(size) if row.kind != "import")
 
     def final_textures(self) -> dict[str, Tex]:
         """The textures by name that still hold their pixels after the frame: nothing was written over them."""
@@ -176,6 +214,12 @@ class Plan:
 def texture_size(size: tuple[int, int], divisor: int) -> tuple[int, int]:
     """Width and height in texels of a texture with ``divisor`` in a frame of ``size``: divided and rounded up."""
     return -(-size[0] // divisor), -(-size[1] // divisor)
+
+
+def texture_bytes(size: tuple[int, int], fmt: str, divisor: int = 1) -> int:
+    """GPU memory in bytes of one texture with ``divisor`` in a frame of ``size``; a history has two."""
+    width, height = texture_size(size, divisor)
+    return width * height * FORMATS[fmt].bytes_per_pixel
 
 
 def compile_plan(
@@ -308,6 +352,8 @@ def check_no_feedback(passes: Sequence[Node], slot_of: Mapping[Tex, int]) -> Non
 
 
 def _spec(fmt: str, divisor: int) -> str:
+    if divisor == ONE_TEXEL:
+        return f"{fmt}(1x1)"
     return fmt if divisor == 1 else f"{fmt}/{divisor}"
 
 

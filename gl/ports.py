@@ -28,6 +28,9 @@ MAX_SAMPLERS: Final = 16
 MAX_OUTPUTS: Final = 8
 """What OpenGL 4.3 guarantees: texture units of a stage; colour attachments, and image units of a compute shader."""
 
+ONE_TEXEL: Final = 1 << 16
+"""The divisor of a texture of one texel, whatever the frame's size: no frame has that many pixels on a side."""
+
 DefineValue = int | float | str
 
 
@@ -69,7 +72,8 @@ class Out:
     Attributes:
         fmt: name of a format of :mod:`gl.formats`.
         doc: what the texture holds, with units and spaces.
-        divisor: its size is the frame's divided by this, rounded up.
+        divisor: its size is the frame's divided by this, rounded up; :data:`ONE_TEXEL` for what belongs to the frame
+            as a whole.
     """
 
     fmt: str

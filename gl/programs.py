@@ -41,9 +41,9 @@ class Program:
             self.code = _compile(node, self.source, vertex, lambda: ctx.program(vertex.text, self.source.text))
             self.vertices = ctx.vertex_array(self.code, [])
         ports = node.work.ports
-        self.reads = [(unit, port) for unit, port in enumerate(ports.samplers) if port in node.reads]
-        self.prevs = [(unit, port) for unit, port in enumerate(ports.samplers) if port in node.prevs]
-        for unit, port in (*self.reads, *self.prevs):
+        connected = node.reads.keys() | node.prevs.keys()
+        self.samplers = [(unit, port) for unit, port in enumerate(ports.samplers) if port in connected]
+        for unit, port in self.samplers:
             sampler = self.code.get(port, None)
             if sampler is not None:
                 sampler.value = unit
@@ -100,6 +100,10 @@ class Programs:
             self._programs[node.program] = program, node
             return program
 
+    def changed(self) -> bool:
+        """Whether a file was written, made or removed since the last :meth:`reload`."""
+        return self._read_stamps() != self._stamps
+
     def reload(self) -> list[ShaderError]:
         """Compile again what has changed on disk since the last call; where that fails, the last good program stays.
 
@@ -129,14 +133,15 @@ class Programs:
         self._programs.clear()
         self._errors.clear()
 
-    def _read_stamps(self) -> dict[str, int]:
-        """When each shader file was last written, in nanoseconds."""
-        stamps: dict[str, int] = {}
+    def _read_stamps(self) -> dict[str, tuple[int, int]]:
+        """When each shader file was last written, in nanoseconds, and its length: clocks of file systems are coarse."""
+        stamps: dict[str, tuple[int, int]] = {}
         for folder, _, names in os.walk(self._root):
             for name in names:
                 file = Path(folder, name)
                 with suppress(FileNotFoundError):  # an editor's temporary file, gone since the folder was listed
-                    stamps[file.relative_to(self._root).as_posix()] = file.stat().st_mtime_ns
+                    found = file.stat()
+                    stamps[file.relative_to(self._root).as_posix()] = found.st_mtime_ns, found.st_size
         return stamps
 
 

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from config import Config
 from gl.executor import Executor, Result
-from gl.formats import lookup
 from gl.pipelines import FrameTraits, build
 from gl.plan import Plan
-from gl.profiler import Profiler
+from gl.profiler import Profiler, is_software
+from gl.shader import ShaderError
 from gl.upload import Uploader
 from raytrace.frame import FramePacket
 
@@ -25,13 +25,17 @@ class Renderer:
     def __init__(self, ctx: moderngl.Context) -> None:
         self.ctx = ctx
         self._uploader = Uploader(ctx)
-        self._executor = Executor(ctx)
-        self._scene = ""
+        self.executor = Executor(ctx)
+        self._software = is_software(ctx)
+        self._scene_id = -1
+        self._index = -1
 
-    def plan(self, packet: FramePacket, config: Config, denoiser: str, keep: Iterable[str] = ()) -> Plan:
+    def plan(
+        self, packet: FramePacket, config: Config, denoiser: str, keep: Iterable[str] = (), split: bool = False
+    ) -> Plan:
         """The compiled graph for ``packet``; raises GraphError when ``keep`` names a texture it does not make."""
-        traits = FrameTraits(moving=packet.prev_normal is not None, pixel_size=packet.pixel_size)
-        return build(config, denoiser, traits).compile(keep=keep)
+        traits = FrameTraits.of(packet, self._software)
+        return build(config, denoiser, traits, split).compile(keep=keep)
 
     def run(
         self,
@@ -42,27 +46,47 @@ class Renderer:
         keep: Iterable[str] = (),
         reset: str = "",
         profiler: Profiler | None = None,
+        split: bool = False,
     ) -> Result:
         """Filter ``packet`` by ``denoiser``.
 
         ``reference`` (H, W, 4) float32 radiance, for the denoiser of that name. ``keep``: textures to leave readable.
-        ``reset``: why histories are void, if they are; a cut or another scene is noticed here.
+        ``reset``: why histories are void, if they are; another scene, a cut and a skipped frame are noticed here.
+        ``split``: the noisy frame is an output as well (:func:`gl.pipelines.build`).
         """
-        plan = self.plan(packet, config, denoiser, keep)
-        if packet.scene != self._scene:
-            reset, self._scene = reset or "another scene", packet.scene
-        elif packet.cut:
-            reset = reset or "camera cut"
+        plan = self.plan(packet, config, denoiser, keep, split)
+        reset = reset or self._discontinuity(packet)
         with profiler.frame() if profiler else nullcontext():
             with profiler.measure("upload") if profiler else nullcontext():
                 self._uploader.upload(packet, (tex.name for tex in plan.imports))
                 if reference is not None:
                     self._uploader.write("frame.reference", reference)
-            return self._executor.run(plan, packet.size, self._uploader.textures, reset, profiler)
+            result = self.executor.run(plan, packet.size, self._uploader.textures, reset, profiler)
+        # Only now: a frame that failed is one that was skipped.
+        self._scene_id, self._index = packet.scene_id, packet.index
+        return result
+
+    def _discontinuity(self, packet: FramePacket) -> str:
+        """Why ``packet`` does not continue the frame run before; empty if it does.
+
+        Motion vectors lead to the frame of the index before. The same frame may be filtered again, as while paused.
+        """
+        if packet.scene_id != self._scene_id:
+            return "another scene"
+        if packet.cut:
+            return "camera cut"
+        return "" if packet.index - self._index in (0, 1) else "frame skipped"
+
+    def reload_shaders(self) -> list[ShaderError]:
+        """Compile again what has changed on disk, here and now (:mod:`gl.background` does it on another thread).
+
+        Returns what is wrong with the shader files as they are: such a program stays as it last was.
+        """
+        return self.executor.reload_shaders()
 
     def release(self) -> None:
         """Free every GL object; the context itself belongs to the caller."""
-        self._executor.release()
+        self.executor.release()
         self._uploader.release()
 
 
@@ -76,6 +100,13 @@ def read(texture: moderngl.Texture) -> NDArray[np.float32]:
     return image / 255.0 if kind is np.uint8 else image
 
 
-def format_bytes(fmt: str) -> int:
-    """Bytes per texel of a graph format."""
-    return lookup(fmt).bytes_per_pixel
+def count_bad(result: Result) -> tuple[int, int] | None:
+    """How many pixels of a frame have a sample, and how many have radiance, that is NaN or infinite.
+
+    None where the frame's graph does not count them (``display.mark_bad``). Waits for the GPU.
+    """
+    texture = result.outputs.get("bad")
+    if texture is None:
+        return None
+    samples, radiance = np.frombuffer(texture.read(), np.uint32).reshape(-1, 2).sum(axis=0, dtype=np.int64)
+    return int(samples), int(radiance)

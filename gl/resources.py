@@ -93,10 +93,14 @@ class Slots:
 
 @dataclass(slots=True)
 class Pair:
-    """The two halves of a history: last frame's, which is read, and this frame's, which is written."""
+    """The two halves of a history: last frame's, which is read, and this frame's, which is written.
+
+    ``frame`` is the frame's size, not the textures': two frames may differ and round up to the same small texture.
+    """
 
     fmt: str
-    size: Size
+    divisor: int
+    frame: Size
     read: moderngl.Texture
     write: moderngl.Texture
     last_run: int
@@ -121,22 +125,24 @@ class Histories:
         """
         status: dict[str, str] = {}
         for history in histories:
-            wanted = texture_size(size, history.divisor)
             pair = self._pairs.get(history.name)
             if pair is None:
                 reason = "first use"
-            elif pair.fmt != history.fmt:
+            elif (pair.fmt, pair.divisor) != (history.fmt, history.divisor):
                 reason = "format changed"
-            elif pair.size != wanted:
+            elif pair.frame != size:
                 reason = "resized"
             elif pair.fed_run != run - 1:
                 reason = "not fed last frame"
             else:
                 reason = f"reset: {reset}" if reset else VALID
-            if pair is None or (pair.fmt, pair.size) != (history.fmt, wanted):
+            wanted = history.fmt, history.divisor, size
+            if pair is None or (pair.fmt, pair.divisor, pair.frame) != wanted:
                 self._drop(history.name)
-                read, write = (self._textures.create(history.fmt, wanted) for _ in range(2))
-                pair = self._pairs[history.name] = Pair(history.fmt, wanted, read, write, run)
+                read, write = (
+                    self._textures.create(history.fmt, texture_size(size, history.divisor)) for _ in range(2)
+                )
+                pair = self._pairs[history.name] = Pair(*wanted, read, write, run)
             pair.last_run = run
             status[history.name] = reason
         return status

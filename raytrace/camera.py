@@ -9,6 +9,8 @@ import numpy as np
 import pyrr
 from numpy.typing import NDArray
 
+from raytrace.frame import Basis, Vector
+
 F64 = NDArray[np.float64]
 
 _NEAR, _FAR = 0.01, 1000.0  # only x, y and w of clip space are used, which do not depend on these two
@@ -47,10 +49,7 @@ class Camera:
         m = np.asarray(camera_to_world, dtype=np.float64)
         axes = m[:3, :3] / np.linalg.norm(m[:3, :3], axis=0)
 
-        def triple(v: F64) -> tuple[float, float, float]:
-            return (float(v[0]), float(v[1]), float(v[2]))
-
-        return Camera(triple(m[:3, 3]), triple(-axes[:, 2]), triple(axes[:, 1]), yfov)
+        return Camera(_triple(m[:3, 3]), _triple(-axes[:, 2]), _triple(axes[:, 1]), yfov)
 
     def with_jitter(self, jitter: tuple[float, float]) -> Camera:
         return replace(self, jitter=jitter)
@@ -71,6 +70,11 @@ class Camera:
         right /= length
         return right, np.cross(right, forward), forward
 
+    def axes(self) -> Basis:
+        """:meth:`basis` as plain numbers, for a frame packet."""
+        right, up, forward = (_triple(axis) for axis in self.basis())
+        return right, up, forward
+
     def view_projection(self, aspect: float, origin: F64) -> NDArray[np.float32]:
         """(4, 4) float32 for column vectors, from world space relative to ``origin`` to clip space, without jitter.
 
@@ -84,3 +88,7 @@ class Camera:
         )
         # pyrr writes matrices for row vectors; ours are for column vectors.
         return np.ascontiguousarray((view @ projection).T, dtype=np.float32)
+
+
+def _triple(v: F64) -> Vector:
+    return float(v[0]), float(v[1]), float(v[2])

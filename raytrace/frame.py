@@ -9,6 +9,12 @@ from numpy.typing import NDArray
 
 F32 = NDArray[np.float32]
 
+Vector = tuple[float, float, float]
+Basis = tuple[Vector, Vector, Vector]
+
+STANDARD_BASIS: Basis = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, -1.0))
+"""Right, up and forward of a camera that looks along -z."""
+
 MISS = -1.0
 """Object id of a pixel whose camera ray leaves the scene."""
 
@@ -37,7 +43,11 @@ class FramePacket:
     ``position``, ``prev_position`` (H, W, 4): xyz = surface point now and a frame ago, relative to the scene's origin;
     a = 1 on surfaces. None unless asked for.
 
+    ``scene``: its name, for people. ``scene_id``: frames of equal numbers show one scene, whatever its name.
     ``pixel_size``: scene units that a pixel is wide at depth 1, 2 tan(yfov / 2) / height.
+    ``basis``: the camera's right, up and forward unit vectors, world space. The ray of pixel (x, y) goes along
+    forward + pixel_size ((x + 1/2 + jitter_x - width / 2) right + (y + 1/2 + jitter_y - height / 2) up), and meets the
+    surface, relative to the camera, at depth times that.
     ``timings``: seconds of wall time by stage name, of the tracer's own clock.
     """
 
@@ -54,8 +64,10 @@ class FramePacket:
     position: F32 | None = None
     prev_position: F32 | None = None
     scene: str = ""
+    scene_id: int = 0
     cut: bool = False
     pixel_size: float = 0.0
+    basis: Basis = STANDARD_BASIS
     jitter: tuple[float, float] = (0.0, 0.0)
     timings: dict[str, float] = field(default_factory=dict)
 

@@ -8,6 +8,7 @@ Embree calls that both run without Python's global lock.
 
 from __future__ import annotations
 
+import itertools
 import os
 import threading
 import time
@@ -22,6 +23,7 @@ from raytrace import kernels
 from raytrace.camera import Camera
 from raytrace.compiled import OBJECT, CompiledScene
 from raytrace.embree import open_caster
+from raytrace.features import images_of
 from raytrace.frame import FramePacket
 from raytrace.guides import Outputs, camera_rays, guide_kernel
 from raytrace.kernels import SHADOW_END
@@ -36,6 +38,9 @@ U32 = NDArray[np.uint32]
 REFERENCE_SEED = 0x5EED0000
 """Added to the run's seed for references, whose frame numbers moreover start at 2^31: they draw other numbers than any
 frame does."""
+
+
+_identities = itertools.count(1)
 
 
 @dataclass(frozen=True)
@@ -116,12 +121,17 @@ class Settings:
 
 
 class Tracer:
-    """Traces one compiled scene. ``with Tracer(...)`` or :meth:`close` ends its threads."""
+    """Traces one compiled scene. ``with Tracer(...)`` or :meth:`close` ends its threads.
+
+    ``images``: names of those its frames have. ``scene_id``: their number, which no other tracer of this process gives.
+    """
 
     def __init__(self, scene: CompiledScene, settings: Settings | None = None) -> None:
         self.scene = scene
         self.settings = settings or Settings()
         self.variant: Variant = variant_of(scene)
+        self.images = images_of(self.variant, self.settings.positions)
+        self.scene_id = next(_identities)
         self.rays = open_caster(scene.triangles, scene.static_count, self.settings.backend)
         self.tables = tables_of(scene)
         self._guides = guide_kernel(self.variant, self.settings.positions)
@@ -131,6 +141,11 @@ class Tracer:
         self.threads = self.settings.threads or len(os.sched_getaffinity(0))
         self._pool = ThreadPoolExecutor(self.threads, "trace") if self.threads > 1 else None
         self._time: tuple[float, float] | None = (0.0, 0.0) if not scene.has_motion else None
+
+    @property
+    def kernels(self) -> tuple[Callable[..., object], ...]:
+        """The shading loops made for scenes of this kind; compiled when they first run."""
+        return self._guides, self._first_hit, self._second_hit
 
     def __enter__(self) -> Tracer:
         return self
@@ -319,16 +334,19 @@ class Tracer:
         none = np.zeros((1, 4), np.float32)
         four = np.empty((4, count, 4), np.float32)
         four[1, :, 3] = 1.0
-        moving, positions = self.variant.moving, self.settings.positions
+
+        def optional(name: str) -> F32:
+            return np.empty((count, 4), np.float32) if name in self.images else none
+
         return Outputs(
             albedo=four[0],
             emission=four[1],
             surface=four[2],
             gradient=np.empty((count, 2), np.float32),
             motion=four[3],
-            prev_normal=np.empty((count, 4), np.float32) if moving else none,
-            position=np.empty((count, 4), np.float32) if positions else none,
-            prev_position=np.empty((count, 4), np.float32) if positions else none,
+            prev_normal=optional("prev_normal"),
+            position=optional("position"),
+            prev_position=optional("prev_position"),
         )
 
     def _write_guides(
@@ -356,22 +374,17 @@ class Tracer:
         def image(values: F32) -> F32:
             return values.reshape(height, width, -1)
 
-        positions = self.settings.positions
+        guides = {name: image(values) for name, values in out._asdict().items() if name in self.images}
         return FramePacket(
             index=index,
             time=now,
             direct=image(direct),
             indirect=image(indirect),
-            albedo=image(out.albedo),
-            emission=image(out.emission),
-            surface=image(out.surface),
-            gradient=image(out.gradient),
-            motion=image(out.motion),
-            prev_normal=image(out.prev_normal) if self.variant.moving else None,
-            position=image(out.position) if positions else None,
-            prev_position=image(out.prev_position) if positions else None,
+            **guides,
             scene=self.scene.scene.name,
+            scene_id=self.scene_id,
             cut=cut,
+            basis=camera.axes(),
             jitter=camera.jitter,
             pixel_size=camera.pixel_size(height),
             timings=timings,

@@ -38,15 +38,18 @@ class Need:
 
 GL = (Need("libEGL.so.1", ("libegl1",)), Need("libGL.so.1", ("libgl1",)))
 EGL_DRIVER = Need("an OpenGL driver for EGL", ("libegl-mesa0", "libgl1-mesa-dri"))
+# What imgui_bundle is linked with, whatever the session.
+PANEL = (Need("libX11.so.6", ("libx11-6",)), Need("libXext.so.6", ("libxext6",)))
 # What the glfw wheel loads by name at run time: the cursor and input libraries are needed to hide and follow the mouse.
 X11 = (
-    Need("libX11.so.6", ("libx11-6",)),
+    *PANEL,
     Need("libXcursor.so.1", ("libxcursor1",)),
     Need("libXi.so.6", ("libxi6",)),
     Need("libXinerama.so.1", ("libxinerama1",)),
     Need("libXrandr.so.2", ("libxrandr2",)),
 )
 WAYLAND = (
+    *PANEL,
     Need("libwayland-client.so.0", ("libwayland-client0",)),
     Need("libwayland-cursor.so.0", ("libwayland-cursor0",)),
     Need("libwayland-egl.so.1", ("libwayland-egl1",)),
@@ -90,7 +93,7 @@ class Machine:
 
 
 def window_libraries(environ: Mapping[str, str]) -> tuple[Need, ...]:
-    """What glfw needs to open a window in this session: nothing without a display.
+    """What glfw and the panel need for a window in this session: nothing without a display.
 
     The choice between X11 and Wayland is the glfw wheel's own (``_get_package_path_variant`` in its library.py).
     """

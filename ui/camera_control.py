@@ -140,6 +140,11 @@ class CameraControl:
         self.following, self._frame = self._begin_following, 0
         self._fly.camera = self._path(0)
 
+    @property
+    def speed(self) -> float:
+        """World units per second."""
+        return self._fly.speed
+
     def change_speed(self, steps: float) -> None:
         """By ``steps`` of the mouse wheel, positive ones faster."""
         self._fly.change_speed(steps)

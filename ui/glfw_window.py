@@ -18,7 +18,7 @@ _KEY_NAMES: Final = {
     value: name.removeprefix("KEY_").removeprefix("LEFT_").removeprefix("RIGHT_")
     for name, value in vars(glfw).items()
     if name.startswith("KEY_") and name not in ("KEY_UNKNOWN", "KEY_LAST")
-}
+} | {glfw.KEY_KP_ADD: "EQUAL", glfw.KEY_KP_SUBTRACT: "MINUS"}
 _ADVICE: Final = "app.py doctor says what is missing; app.py render works without a window"
 
 
@@ -31,9 +31,17 @@ class Key:
 
 
 @dataclass(frozen=True)
-class LookButton:
-    """The right mouse button."""
+class Char:
+    """Text typed: a Unicode code point."""
 
+    codepoint: int
+
+
+@dataclass(frozen=True)
+class MouseButton:
+    """``button``: 0 left, 1 right, 2 middle."""
+
+    button: int
     pressed: bool
 
 
@@ -47,14 +55,24 @@ class Cursor:
 
 @dataclass(frozen=True)
 class Wheel:
-    """Steps of the mouse wheel, positive away from the hand."""
+    """Steps of the mouse wheel, positive away from the hand; ``sideways``: of a second wheel, or of two fingers."""
 
     steps: float
+    sideways: float = 0.0
 
 
 @dataclass(frozen=True)
-class FocusLost:
-    """Keys may be released from now on without an event."""
+class DroppedFiles:
+    """Files let go of above the window."""
+
+    paths: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Focus:
+    """The keyboard came to the window, or left it: keys may then be released without an event."""
+
+    gained: bool
 
 
 @dataclass(frozen=True)
@@ -62,7 +80,7 @@ class Exposed:
     """What the window shows has to be drawn again: it was resized or uncovered."""
 
 
-Event = Key | LookButton | Cursor | Wheel | FocusLost | Exposed
+Event = Key | Char | MouseButton | Cursor | Wheel | DroppedFiles | Focus | Exposed
 
 
 class _Loader:
@@ -138,6 +156,22 @@ class Window:
         width, height = glfw.get_framebuffer_size(self._handle)
         return int(width), int(height)
 
+    @property
+    def size(self) -> Size:
+        """Width and height in screen coordinates, the unit of :class:`Cursor`."""
+        width, height = glfw.get_window_size(self._handle)
+        return int(width), int(height)
+
+    @property
+    def content_scale(self) -> float:
+        """How much larger than on an ordinary screen text must be drawn to look as large, in pixels."""
+        return float(glfw.get_window_content_scale(self._handle)[0])
+
+    @property
+    def handle(self) -> Any:
+        """glfw's own handle, for a context that shares objects with this one."""
+        return self._handle
+
     def show(self) -> None:
         """Make the window visible."""
         glfw.show_window(self._handle)
@@ -200,8 +234,11 @@ class Window:
         glfw.set_key_callback(self._handle, lambda _, key, code, action, mods: self._note_key(key, action))
         glfw.set_mouse_button_callback(self._handle, lambda _, button, action, mods: self._note_button(button, action))
         glfw.set_cursor_pos_callback(self._handle, lambda _, x, y: note(Cursor(x, y)))
-        glfw.set_scroll_callback(self._handle, lambda _, x, y: note(Wheel(y)))
-        glfw.set_window_focus_callback(self._handle, lambda _, focused: None if focused else note(FocusLost()))
+        glfw.set_char_callback(self._handle, lambda _, codepoint: note(Char(codepoint)))
+        glfw.set_scroll_callback(self._handle, lambda _, x, y: note(Wheel(y, x)))
+        # The stubs have GLFW's own three arguments, but the wrapper hands over a list.
+        glfw.set_drop_callback(self._handle, lambda _, paths: note(DroppedFiles(tuple(paths))))  # type: ignore[arg-type,misc]
+        glfw.set_window_focus_callback(self._handle, lambda _, focused: note(Focus(bool(focused))))
         glfw.set_window_refresh_callback(self._handle, lambda _: note(Exposed()))
         glfw.set_framebuffer_size_callback(self._handle, lambda _, width, height: note(Exposed()))
 
@@ -213,8 +250,8 @@ class Window:
             self._events.append(Key(_KEY_NAMES[key], action == glfw.PRESS))
 
     def _note_button(self, button: int, action: int) -> None:
-        if button == glfw.MOUSE_BUTTON_RIGHT:
-            self._events.append(LookButton(action == glfw.PRESS))
+        if button <= glfw.MOUSE_BUTTON_MIDDLE:
+            self._events.append(MouseButton(button, action == glfw.PRESS))
 
     def _last_problem(self) -> str:
         return self._problems.lines[-1] if self._problems.lines else "glfw gives no reason"

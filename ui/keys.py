@@ -13,11 +13,26 @@ class Action(Enum):
     """Show another method [its name in :data:`gl.pipelines.DENOISERS`]."""
     PREVIOUS = auto()
     """Show the method that was shown before."""
-    TOGGLE = auto()
-    """Switch a parameter of the configuration on or off [section.key]."""
+    NEXT = auto()
+    """A parameter takes its next value, a switch the other one [section.key, or a key of the method's own section]."""
+    STAGE = auto()
+    """Wavelet iterations, or another count, become 0 or what they were [section.key, or a key of the method's own]."""
+    COUNT = auto()
+    """A number of the configuration goes up or down [key and step, such as ``iterations +1``]."""
+    JITTER = auto()
+    """Sub-pixel camera jitter on or off, whatever it is now."""
     ANIMATE = auto()
+    STEP = auto()
+    """One frame further in the scene's time, and stop there."""
     RESET_CAMERA = auto()
     RESET_HISTORY = auto()
+    NEXT_SCENE = auto()
+    VIEW = auto()
+    """Look at another texture of the graph [+1 or -1: the next or the one before]."""
+    FLIP = auto()
+    """Show or hide something that is no parameter of the picture [a switch of :class:`ui.state.State`]."""
+    RESOLUTION = auto()
+    """Render at the next size of the ladder [+1 or -1]."""
     SCREENSHOT = auto()
     BACK = auto()
     """Let go of the mouse or, if it is free, close the window."""
@@ -37,17 +52,46 @@ class Binding(NamedTuple):
     @property
     def label(self) -> str:
         """The key as people call it."""
-        return "Esc" if self.key == "ESCAPE" else self.key.title()
+        return _LABELS.get(self.key, self.key.replace("_", " ").title())
 
+
+_LABELS: Final = {"ESCAPE": "Esc", "EQUAL": "+", "MINUS": "-", "PERIOD": "."}
 
 BINDINGS: Final = (
     Binding("0", Action.SHOW, "off: one path per pixel as it is", "none"),
     Binding("1", Action.SHOW, "SVGF, spatiotemporal variance-guided filtering", "svgf"),
+    Binding("2", Action.SHOW, "BMFR, blockwise multi-order feature regression", "bmfr"),
     Binding("TAB", Action.PREVIOUS, "back to the method shown before, and forth again"),
-    Binding("F5", Action.TOGGLE, "anti-aliasing over time (TAA) on or off", "taa.enabled"),
+    Binding("P", Action.NEXT, "next preset of the method's parameters", "preset"),
+    Binding("F1", Action.NEXT, "accumulation over time on or off", "temporal"),
+    Binding("F2", Action.NEXT, "guidance by the variance on or off", "variance_guided"),
+    Binding("F3", Action.STAGE, "the à-trous wavelet on or off", "iterations"),
+    Binding("LEFT", Action.COUNT, "one wavelet iteration less", "iterations -1"),
+    Binding("RIGHT", Action.COUNT, "one wavelet iteration more", "iterations +1"),
+    Binding("F4", Action.NEXT, "filtering without the surfaces' albedo (demodulation) on or off", "demodulate"),
+    Binding("F5", Action.NEXT, "anti-aliasing over time (TAA) on or off", "taa.enabled"),
+    Binding("F6", Action.JITTER, "sub-pixel camera jitter on or off"),
+    Binding("F7", Action.NEXT, "firefly rejection: off, clamp, variance", "firefly.mode"),
+    Binding("F8", Action.NEXT, "direct and indirect light filtered apart or together", "separate"),
+    Binding("F9", Action.NEXT, "tone curve: none, Reinhard, ACES", "display.tonemap"),
+    Binding("UP", Action.COUNT, "half a stop brighter", "display.exposure +0.5"),
+    Binding("DOWN", Action.COUNT, "half a stop darker", "display.exposure -0.5"),
+    Binding("L", Action.NEXT, "exposure by itself (light meter) on or off", "display.auto_exposure"),
     Binding("SPACE", Action.ANIMATE, "moving objects and lamps stop or go on"),
+    Binding("PERIOD", Action.STEP, "one step of the animation, then stop"),
+    Binding("N", Action.NEXT_SCENE, "next of the scenes that come with the program"),
     Binding("R", Action.RESET_CAMERA, "camera back to where it began"),
     Binding("H", Action.RESET_HISTORY, "forget what was accumulated over time"),
+    Binding("B", Action.VIEW, "look at the next texture of the graph, after the last at the picture again", "+1"),
+    Binding("V", Action.VIEW, "look at the texture before", "-1"),
+    Binding("X", Action.FLIP, "split view: noisy to the left of the mouse, denoised to the right", "split"),
+    Binding(
+        "I", Action.FLIP, "numbers of the pixel under the mouse: channels, history, why it was rejected", "inspect"
+    ),
+    Binding("EQUAL", Action.RESOLUTION, "render more pixels", "+1"),
+    Binding("MINUS", Action.RESOLUTION, "render fewer pixels", "-1"),
+    Binding("G", Action.FLIP, "show or hide the panel with numbers and sliders", "hud"),
+    Binding("K", Action.FLIP, "show or hide this list of keys", "help"),
     Binding("F12", Action.SCREENSHOT, "save the picture as shot_NNN.png"),
     Binding("ESCAPE", Action.BACK, "let go of the mouse; otherwise quit"),
     Binding("W", Action.FLY, "fly forward", "forward"),
@@ -62,6 +106,7 @@ BINDINGS: Final = (
 MOUSE: Final = (
     ("right button", "held: look around"),
     ("wheel", "fly faster or slower"),
+    ("a file dropped", "opens as a scene"),
 )
 
 BY_KEY: Final = {binding.key: binding for binding in BINDINGS}

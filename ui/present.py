@@ -27,7 +27,9 @@ layout(location = 0) out vec4 out_color;
 void main() { out_color = vec4(texture(in_picture, uv).rgb, 1.0); }
 """
 
-_BORDER: Final = (0.05, 0.05, 0.05)
+_LINE: Final = (0.9, 0.9, 0.9)  # between two pictures
+
+BORDER: Final = (0.05, 0.05, 0.05)
 
 
 def letterbox(picture: Size, window: Size) -> Box:
@@ -48,19 +50,38 @@ class Presenter:
         self._sharp = ctx.sampler(filter=(moderngl.NEAREST, moderngl.NEAREST), repeat_x=False, repeat_y=False)
         self._smooth = ctx.sampler(filter=(moderngl.LINEAR, moderngl.LINEAR), repeat_x=False, repeat_y=False)
 
-    def draw(self, picture: moderngl.Texture, target: moderngl.Framebuffer, size: Size) -> None:
-        """Fill ``target``, ``size`` pixels, with ``picture`` and a border. At whole scales pixels stay sharp."""
+    def draw(
+        self,
+        picture: moderngl.Texture,
+        target: moderngl.Framebuffer,
+        size: Size,
+        left: moderngl.Texture | None = None,
+        split: int = 0,
+    ) -> None:
+        """Fill ``target``, ``size`` pixels, with ``picture`` and a border. At whole scales pixels stay sharp.
+
+        ``left``: another picture of the same size, shown to the left of column ``split`` of ``target``.
+        """
         box = letterbox(picture.size, size)
         whole = box[2] % picture.width == 0 and box[3] % picture.height == 0
         sampler = self._sharp if whole else self._smooth
         self._ctx.enable_only(moderngl.NOTHING)
         target.use()
         target.viewport = (0, 0, *size)
-        target.clear(*_BORDER)
+        target.clear(*BORDER)
         target.viewport = box
-        picture.use(0)
         sampler.use(0)
+        picture.use(0)
         self._triangle.render(moderngl.TRIANGLES, 3)
+        if left is not None and split > 0:
+            # The same triangle once more, cut off at the column: both pictures lie on the same pixels.
+            target.scissor = (0, 0, min(split, size[0]), size[1])
+            left.use(0)
+            self._triangle.render(moderngl.TRIANGLES, 3)
+            if split < size[0]:
+                target.scissor = (split, 0, 1, size[1])
+                target.clear(*_LINE)
+            target.scissor = None  # type: ignore[assignment]  # None is how moderngl takes it back
         sampler.clear(0)
         target.viewport = (0, 0, *size)
 

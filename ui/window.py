@@ -2,211 +2,317 @@
 
 from __future__ import annotations
 
-import re
 import sys
 import time
-from collections import deque
+from collections.abc import Callable
 from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+import moderngl
 import numpy as np
 
+import assets
 from config import Config
 from errors import UserError
 from gl.executor import Result
-from gl.profiler import Profiler
-from gl.renderer import Renderer, read
-from images import write_png
+from gl.renderer import count_bad, read
 from raytrace.frame import FramePacket
-from raytrace.shot import FPS, Shot
-from raytrace.worker import Request, Worker
 from session import open_shot
 from ui import keys
-from ui.camera_control import CameraControl, HeldKeys
-from ui.glfw_window import Cursor, Event, Exposed, FocusLost, Key, LookButton, Wheel, Window
+from ui.camera_control import HeldKeys
+from ui.compiling_context import CompilingContext
+from ui.filters import Filters
+from ui.glfw_window import Cursor, DroppedFiles, Event, Exposed, Focus, Key, MouseButton, Wheel, Window
 from ui.keys import Action
-from ui.present import Presenter
-from ui.state import State
+from ui.log import Log
+from ui.opening import Opening
+from ui.overlay import Overlay
+from ui.present import Presenter, letterbox
+from ui.resolution import Calibration, step
+from ui.screenshot import save_screenshot
+from ui.stage import Stage
+from ui.state import PICTURE, State
+from ui.status import Status
+from ui.texture_view import TextureView
+from ui.title import Pace, Title
+
+Size = tuple[int, int]
 
 _LONGEST_WAIT: Final = 0.25  # seconds without an event after which the loop looks again whether it can be seen
-_TITLE_EVERY: Final = 0.5  # seconds
-_NEWS_FOR: Final = 3.0  # seconds
+_COUNT_EVERY: Final = 8  # frames: reading the counters waits for the GPU
+_RIGHT: Final = 1  # mouse button
 
 
-def run(config: Config, scene: str, denoiser: str, camera: str, animate: bool, out: Path) -> None:
-    """Open the window and return when it is closed; everything is released then.
+@dataclass(frozen=True)
+class Wishes:
+    """What the command line asks of the window.
 
-    Args:
+    Attributes:
         scene: a built-in scene, or a file.
         denoiser: a key of :data:`gl.pipelines.DENOISERS` to begin with.
         camera: ``"still"``, ``"flight"``, or a camera path in JSON; the user may take over at any time.
         animate: objects move from the start, not only once Space was pressed.
         out: folder for screenshots, made when the first is taken.
+        hud: the panel is shown from the start.
+        calibrate: begin with as many pixels, the configured size at most, as this machine shows fluently.
+        log: print what changes, a line each.
+    """
+
+    scene: str
+    denoiser: str
+    camera: str
+    animate: bool
+    out: Path
+    hud: bool
+    calibrate: bool
+    log: bool = False
+
+
+def run(config: Config, wishes: Wishes) -> None:
+    """Open the window and return when it is closed; everything is released then.
 
     Raises:
         UserError: no window can be opened, or the scene or the camera path cannot be loaded.
     """
     with ExitStack() as stack:
         # The window comes first, hidden: where none can be opened, nobody waits for a scene to be prepared.
-        window = stack.enter_context(Window(scene, (config.render.width, config.render.height)))
-        shot = open_shot(scene, config, camera, animate=True)  # Space may start what rests at first
-        stack.enter_context(shot.tracer)
-        renderer = Renderer(window.ctx)
-        stack.callback(renderer.release)
-        presenter = Presenter(window.ctx)
-        stack.callback(presenter.release)
-        worker = stack.enter_context(Worker(shot.tracer, window.wake))
-        control = CameraControl(shot.camera, camera != "still", shot.scene.extent)
+        window = stack.enter_context(Window(wishes.scene, (config.render.width, config.render.height)))
+        shot = open_shot(wishes.scene, config, wishes.camera, animate=True)  # Space may start what rests at first
+        stage = Stage(shot, wishes.camera != "still", window.wake)
+        viewer = Viewer(window, stage, config, wishes)
+        stack.callback(viewer.release)
         print(f"{keys.text()}\n", flush=True)
         window.show()
-        Viewer(window, shot, worker, renderer, presenter, control, State(config, denoiser, animate), out).loop()
+        viewer.loop()
 
 
 class Viewer:
-    """One open window on one shot. What is shown is in ``state``; keys change nothing else."""
+    """One open window. What is shown is in ``state``; keys and the panel change nothing else."""
 
-    def __init__(
-        self,
-        window: Window,
-        shot: Shot,
-        worker: Worker,
-        renderer: Renderer,
-        presenter: Presenter,
-        control: CameraControl,
-        state: State,
-        out: Path,
-    ) -> None:
-        self.window, self.shot, self.worker, self.state = window, shot, worker, state
-        self._renderer, self._presenter, self._control, self._out = renderer, presenter, control, out
-        self._profiler = Profiler(window.ctx)
+    def __init__(self, window: Window, stage: Stage, config: Config, wishes: Wishes) -> None:
+        self.window, self.stage, self._wishes = window, stage, wishes
+        self.state = State(config, wishes.denoiser, wishes.animate, hud=wishes.hud)
+        self._base = config.render.width, config.render.height
+        self._size = self._base
+        with ExitStack() as stack:
+            stack.callback(lambda: self.stage.close())  # whichever it is by then
+            self._filters = Filters(window.ctx, _second_context(stack), window.wake)
+            stack.callback(self._filters.release)
+            self._presenter = Presenter(window.ctx)
+            stack.callback(self._presenter.release)
+            self._textures = TextureView(window.ctx)
+            stack.callback(self._textures.release)
+            self._overlay = Overlay(window.ctx)
+            stack.callback(self._overlay.release)
+            self._stack = stack.pop_all()
+        self._calibration: Calibration | None = None
+        self._opening: Opening | None = None
+        self._refused = ""  # why a scene could not be opened
         self._held = HeldKeys()
         self._cursor = Cursor(0.0, 0.0)
-        self._look = (0.0, 0.0)
-        self._animation_frame = 0
         self._result: Result | None = None
-        self._exposed = False
-        self._title = Title(f"{shot.scene.scene.name}", str(window.ctx.info["GL_RENDERER"]))
+        self._stale = False
+        self._pace = Pace()
+        self._last = time.perf_counter()
+        renderer = str(window.ctx.info["GL_RENDERER"])
+        self._title = Title(renderer)
+        self._log = Log(sys.stdout if wishes.log else None)
+        self.status = Status(stage.name, renderer, self._size)
+        self._calibrate()
 
     def loop(self) -> None:
         """Until the window is closed: one frame is traced while the one before it is filtered and shown."""
         while not (self.window.closing or self.state.closing):
             for event in self.window.wait(_LONGEST_WAIT):
                 self._handle(event)
+            self._fulfil()
             self.window.capture(self.state.looking)
             if self.window.hidden:
                 continue  # a frame under way waits in the worker; no other is begun
-            if not self.worker.busy:
-                self.worker.submit(self._request())
-            packet = self.worker.take()
+            packet = None if self.stage.idle else self.stage.take()
+            if self.stage.idle:
+                self._begin()
             if packet is not None:
-                self.worker.submit(self._request())
                 self._filter(packet)
-            if self._result is not None and (packet is not None or self._exposed):
+            if self._result is not None and (packet is not None or self._stale):
                 self._show(self._result)
 
+    def release(self) -> None:
+        """Free everything but the window, and tell if anything was done that OpenGL refused."""
+        if (error := self.window.ctx.error) != "GL_NO_ERROR":
+            print(f"OpenGL reports {error}: a mistake of this program, or of the driver", file=sys.stderr)
+        if self._opening is not None:
+            self._opening.close()
+        self._stack.close()
+
     def _handle(self, event: Event) -> None:
-        """Note what happened. Everything that the user does comes through here."""
+        """Note what happened. Everything that the user does comes through here; the panel's widgets come first."""
+        taken = self._overlay.feed(event) if self._overlaid else False
+        self._stale |= self._overlaid
         now = time.perf_counter()
         match event:
             case Key(name, pressed) if name in keys.BY_KEY:
                 binding = keys.BY_KEY[name]
                 if binding.action is Action.FLY:
-                    (self._held.press if pressed else self._held.release)(binding.value, now)
-                elif pressed:
+                    # A key that is let go of is let go of, whoever has the keyboard by now.
+                    if not pressed:
+                        self._held.release(binding.value, now)
+                    elif not taken:
+                        self._held.press(binding.value, now)
+                elif pressed and not taken:
                     self.state.perform(binding)
-            case LookButton(pressed):
-                self.state.looking = pressed
+                    self._stale = True
+            case MouseButton(button, pressed) if button == _RIGHT:
+                self.state.looking = pressed and not taken
             case Cursor(x, y):
                 if self.state.looking:
-                    self._look = (self._look[0] + x - self._cursor.x, self._look[1] + y - self._cursor.y)
+                    self.stage.look(x - self._cursor.x, y - self._cursor.y)
                 self._cursor = event
-            case Wheel(steps):
-                self._control.change_speed(steps)
-            case FocusLost():
+                self._stale |= self.state.split or self.state.look.zoom > 0
+            case Wheel(steps) if not taken:
+                self.stage.control.change_speed(steps)
+                self.state.news = f"flight speed {self.stage.control.speed:.3g} units a second"
+            case DroppedFiles(paths):
+                self.state.scene = paths[0]
+            case Focus(gained=False):
                 self._held.clear()
                 self.state.looking = False
             case Exposed():
-                self._exposed = True
+                self._stale = True
 
-    def _request(self) -> Request:
-        """The next frame to trace: one step of the scene's time and of the camera."""
-        state, control = self.state, self._control
-        cut, state.home = state.home, False
-        if cut:
-            control.home()
-        held, look = self._held.drain(time.perf_counter()), self._look
-        self._look = (0.0, 0.0)
-        camera = control.next(held, look)
-        now = self._animation_frame / FPS
-        if state.animate:
-            self._animation_frame += 1
-        return Request(camera, self.shot.size, now, state.jitter, cut)
+    @property
+    def _overlaid(self) -> bool:
+        """Whether anything is drawn over the picture; if not, ImGui is left alone."""
+        return self.state.hud or self.state.help or self.state.inspect
+
+    @property
+    def _progress(self) -> str:
+        """What is being prepared in the background, "" for nothing."""
+        if self._opening is not None:
+            return self._opening.progress or f"opening {self._opening.name}"
+        return self._filters.progress
+
+    def _fulfil(self) -> None:
+        """Do what was wished for since the last time: another resolution, another scene."""
+        state = self.state
+        if state.resolution:
+            self._calibration = None
+            rungs, state.resolution = state.resolution, 0
+            self._resize(step(self._base, self._size, rungs))
+        if state.next_scene:
+            state.next_scene = False
+            names = list(assets.SCENES)
+            now = self._opening.name if self._opening else self.stage.name
+            state.scene = names[(names.index(now) + 1) % len(names)] if now in names else names[0]
+        if state.scene:
+            self._open(state.scene)
+            state.scene = ""
+        # A frame under way is waited for, not thrown away.
+        if self._opening is not None and self._opening.done and self.stage.idle:
+            self._enter(self._opening)
+
+    def _open(self, name: str) -> None:
+        """Let a scene be prepared; the one shown goes on until then."""
+        if self._opening is not None:
+            self._opening.close()
+        self._refused = ""
+        self._opening = Opening(name, self.state.config, None, True, notify=self.window.wake)
+
+    def _enter(self, opening: Opening) -> None:
+        """Show the scene that has been prepared, or tell why it cannot be."""
+        self._opening = None
+        try:
+            shot = opening.result()
+        except UserError as error:
+            self.state.news = str(error).partition("\n")[0]
+            self._refused = str(error)
+            return
+        self.stage.close()
+        self.stage = Stage(shot, self._wishes.camera != "still", self.window.wake)
+        self.status.scene, self.status.packet, self.status.result = self.stage.name, None, None
+        self.state.news = "\n".join(opening.notices).partition("\n")[0] or f"opened {self.stage.name}"
+        self._calibrate()
+
+    def _calibrate(self) -> None:
+        """Look for the resolution to show this scene in."""
+        if self._wishes.calibrate:
+            self._calibration = Calibration(self._base)
+            self._resize(self._calibration.size)
+
+    def _resize(self, size: Size) -> None:
+        if size != self._size:
+            self._size = size
+            self.state.news = f"{size[0]}x{size[1]} pixels"
+            self._pace.clear()
+
+    def _begin(self) -> None:
+        """Let the next frame be traced, unless its scene is about to be left."""
+        if self._opening is None or not self._opening.done:
+            self.stage.begin(self.state, self._size, self._held)
 
     def _filter(self, packet: FramePacket) -> None:
-        state = self.state
-        reset, state.reset = state.reset, ""
-        self._result = self._renderer.run(packet, state.config, state.denoiser, reset=reset, profiler=self._profiler)
-        self._title.count(time.perf_counter(), packet.timings["trace"] * 1e3)
+        self._result = self._filters.run(packet, self.state)
+        now = time.perf_counter()
+        interval, self._last = now - self._last, now
+        self._pace.count(now, packet.timings["trace"] * 1e3)
+        settled = packet.size == self._size and not self._filters.progress
+        if self._calibration is not None and settled and self._calibration.count(interval):
+            self._resize(self._calibration.size)
+        status, profile = self.status, self._filters.profile
+        status.show(packet, self._result)
+        status.triangles = self.stage.shot.scene.scene.triangle_count
+        status.fps, status.trace_ms = self._pace.fps, self._pace.trace_ms
+        status.passes = profile.rows() if profile else []
+        if not self.state.hud:
+            status.bad = None
+        elif packet.index % _COUNT_EVERY == 0:
+            status.bad = count_bad(self._result)
+        status.errors = [*self._filters.errors, *filter(None, [self._refused])]
+        self._log.frame(packet.index, packet.size, self._result.plan, status.errors)
 
     def _show(self, result: Result) -> None:
         """Draw the last picture, at whatever size the window now has."""
+        state, screen, size = self.state, self.window.ctx.screen, self.window.framebuffer_size
         picture = result.outputs["display"]
-        self._presenter.draw(picture, self.window.ctx.screen, self.window.framebuffer_size)
+        scale = size[0] / max(self.window.size[0], 1)
+        column, row = int(self._cursor.x * scale), size[1] - 1 - int(self._cursor.y * scale)
+        self.status.cursor = _pixel(column, row, picture.size, size)
+        looked_at = state.view != PICTURE or state.look.zoom > 0
+        if not (looked_at and self._textures.draw(state, self.status, screen, size)):
+            self._presenter.draw(picture, screen, size, result.outputs.get("noisy"), column)
+        self.status.progress = self._progress
+        if self._overlaid:
+            self._overlay.draw(self.window, state, self.status)
         self.window.swap()
-        self._exposed = False
-        if self.state.screenshot:
-            self.state.screenshot = False
-            self.state.news = save_screenshot(self._out, (read(picture)[..., :3] * 255.0 + 0.5).astype(np.uint8))
-        method = f"{self.state.denoiser}{' + TAA' if self.state.anti_aliased else ''}"
-        filter_ms = sum(row.milliseconds for row in self._profiler.rows())
-        title = self._title.update(time.perf_counter(), method, filter_ms, self.state.news)
-        self.state.news = ""
+        self._stale = False
+        if state.screenshot:
+            state.screenshot = False
+            state.news = save_screenshot(self._wishes.out, (read(picture)[..., :3] * 255.0 + 0.5).astype(np.uint8))
+        method = f"{state.denoiser}{' + TAA' if state.anti_aliased else ''}"
+        self._log.news(state.news)
+        news = state.news or self._progress
+        title = self._title.update(time.perf_counter(), self.stage.name, method, self._pace, news)
+        state.news = ""
         if title:
             self.window.set_title(title)
 
 
-class Title:
-    """The window's title: scene, method, frames per second, milliseconds; for a while also what was just done."""
-
-    def __init__(self, scene: str, renderer: str) -> None:
-        self._scene, self._renderer = scene, renderer
-        self._news, self._news_until = "", 0.0
-        self._changed = -_TITLE_EVERY
-        self._shown: deque[float] = deque(maxlen=32)
-        self._trace_ms: deque[float] = deque(maxlen=32)
-
-    def count(self, now: float, trace_ms: float) -> None:
-        """One more frame was shown; it took so long to trace. ``now``: seconds, of the clock :meth:`update` uses."""
-        self._shown.append(now)
-        self._trace_ms.append(trace_ms)
-
-    def update(self, now: float, method: str, filter_ms: float, news: str) -> str:
-        """A new title, or "" while the old one is fresh enough."""
-        if news:
-            self._news, self._news_until = news, now + _NEWS_FOR
-        elif now - self._changed < _TITLE_EVERY:
-            return ""
-        self._changed = now
-        span = self._shown[-1] - self._shown[0] if self._shown else 0.0
-        rate = (len(self._shown) - 1) / span if span > 0.0 else 0.0
-        parts = [self._news] if now < self._news_until else []
-        parts += [self._scene, method, f"{rate:.1f} fps"]
-        parts += [f"tracing {float(np.median(self._trace_ms)):.0f} ms", f"filtering {filter_ms:.0f} ms", self._renderer]
-        return " · ".join(parts)
-
-
-def save_screenshot(folder: Path, pixels: np.ndarray[tuple[int, ...], np.dtype[np.uint8]]) -> str:
-    """Write ``pixels`` (H, W, 3), row 0 = bottom, to ``shot_NNN.png``, NNN not used yet; returns what to tell the user.
-
-    A folder that cannot be written to is told as well, but closes no window.
-    """
-    taken = [int(found[1]) for path in folder.glob("shot_*.png") if (found := re.fullmatch(r"shot_(\d+)", path.stem))]
-    path = folder / f"shot_{max(taken, default=-1) + 1:03d}.png"
+def _second_context(stack: ExitStack) -> Callable[[], moderngl.Context] | None:
+    """What opens a context for compiling in the background, owned by ``stack``; None where there can be no second."""
     try:
-        write_png(path, pixels)
+        context = CompilingContext()
     except UserError as error:
-        print(f"error: {error}", file=sys.stderr, flush=True)
-        return str(error).partition("\n")[0]
-    print(path, flush=True)
-    return f"saved {path}"
+        print(f"shaders are compiled while you wait: {error}", file=sys.stderr)
+        return None
+    stack.callback(context.close)
+    return context.open
+
+
+def _pixel(column: int, row: int, picture: Size, window: Size) -> tuple[int, int] | None:
+    """The texel of ``picture`` shown at a pixel of ``window``, both with row 0 at the bottom; None beside it."""
+    x, y, width, height = letterbox(picture, window)
+    if not (x <= column < x + width and y <= row < y + height):
+        return None
+    return (column - x) * picture[0] // width, (row - y) * picture[1] // height

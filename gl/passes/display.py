@@ -34,8 +34,14 @@ class Tonemap(FragmentPass):
 
     shader = "display/tonemap.frag"
     in_radiance = In("linear radiance")
-    out_color = Out("rgba16f", "tone-mapped colour, linear")
+    out_color = Out("rgba16f", "rgb: tone-mapped colour, linear; a: 0 where the radiance was NaN or infinite, else 1")
     u_scale = Uniform("float", "> 0, 2 to the exposure in EV")
+
+
+class MeasuredTonemap(Tonemap):
+    """The same, with an exposure that was measured on the GPU (:mod:`gl.passes.exposure`) beneath ``u_scale``."""
+
+    in_exposure = In("exposure, EV, one texel")
 
 
 class Encode(FragmentPass):
@@ -46,8 +52,10 @@ class Encode(FragmentPass):
     out_color = Out("rgba8", "sRGB")
 
 
-def tonemap(g: Graph, radiance: Tex, p: Display) -> Tex:
-    """Add exposure and tone curve."""
-    return g.add(
-        Tonemap(u_scale=2.0**p.exposure, defines={"OPERATOR": OPERATORS[p.tonemap]}), in_radiance=radiance
-    ).out_color
+def tonemap(g: Graph, radiance: Tex, p: Display, exposure: Tex | None = None) -> Tex:
+    """Add exposure and tone curve; ``exposure``: the measured one, on top of which that of ``p`` comes."""
+    scale, operator = 2.0**p.exposure, OPERATORS[p.tonemap]
+    if exposure is None:
+        return g.add(Tonemap(u_scale=scale, defines={"OPERATOR": operator}), in_radiance=radiance).out_color
+    work = MeasuredTonemap(u_scale=scale, defines={"OPERATOR": operator, "MEASURED": 1})
+    return g.add(work, "tonemap", in_radiance=radiance, in_exposure=exposure).out_color

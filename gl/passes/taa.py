@@ -18,7 +18,7 @@ class Resolve(FragmentPass):
     """Blend with the reprojected history, held inside the colours of the 3x3 neighbourhood."""
 
     shader = "taa/resolve.frag"
-    in_color = In("tone-mapped colour, linear")
+    in_color = In("rgb: tone-mapped colour, linear; a: 0 where there is none, and the history is all that is shown")
     in_motion = In("xy: previous uv - uv")
     in_surface = In("w: depth, scene units; 0 = sky")
     prev_color = Prev("what this pass wrote in the last frame")

@@ -17,7 +17,7 @@ from config import Config
 from gl.executor import Result
 from gl.pipelines import FrameTraits, build
 from gl.renderer import read
-from images import read_exr
+from images import read_exr, viewable
 from raytrace.camera import Camera
 from raytrace.frame import FramePacket
 from raytrace.shot import Shot
@@ -280,13 +280,13 @@ def test_show_of_the_finished_picture_is_the_picture(app: App, tmp_path: Path) -
 def test_values_of_any_range_become_visible() -> None:
     def shown(values: list[float]) -> list[float]:
         image = np.array(values, np.float32).reshape(1, -1, 1)
-        return [float(value) for value in headless.viewable(image)[0, :, 1]]
+        return [float(value) for value in viewable(image)[0, :, 1]]
 
     assert shown([0.0, 0.25, 1.0]) == [0.0, 0.25, 1.0], "what fits stays as it is"
     assert shown([-1.0, 0.0, 1.0]) == pytest.approx([0.0, 0.5, 1.0], abs=0.02)
     assert shown([0.0, 10.0]) == pytest.approx([0.0, 1.0], abs=0.02)
     assert shown([float("nan"), float("inf")]) == [0.0, 0.0]
-    two = headless.viewable(np.full((1, 1, 2), 0.5, np.float32))
+    two = viewable(np.full((1, 1, 2), 0.5, np.float32))
     assert two[0, 0].tolist() == [0.5, 0.5, 0.0]
 
 

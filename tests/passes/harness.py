@@ -224,7 +224,7 @@ class Bench:
         reset: str = "",
     ) -> Images:
         """One frame through a whole denoiser; outputs ``radiance`` and ``display``."""
-        traits = FrameTraits(moving=packet.prev_normal is not None, pixel_size=packet.pixel_size)
+        traits = FrameTraits.of(packet)
         return self.run(packet, build(config or Config(), denoiser, traits), keep, reset)
 
     def release(self) -> None:

@@ -130,4 +130,10 @@ def room(index: int, size: tuple[int, int]) -> FramePacket:
         motion=motion.astype(np.float32),
         scene="room",
         pixel_size=2 / FOCAL / height,
+        basis=(triple(right), triple(up), triple(forward)),
     )
+
+
+def triple(axis: F64) -> tuple[float, float, float]:
+    x, y, z = axis.tolist()
+    return x, y, z

@@ -160,11 +160,22 @@ class Oracle:
         """Running mean until the share of the new sample has fallen to alpha, exponential from then on."""
         if history is None:
             return sample, moments
+        before = found.fetch(history.color)
+        if self.p.color_clamp:
+            before = np.clip(before, *self.bounds(sample))
         share = 1 / (found.length + 1)
         for_color = np.where(found.length > 0, np.maximum(share, self.p.alpha), 1.0)[..., None]
         for_moments = np.where(found.length > 0, np.maximum(share, self.p.alpha_moments), 1.0)[..., None]
-        color = for_color * sample + (1 - for_color) * found.fetch(history.color)
+        color = for_color * sample + (1 - for_color) * before
         return color, for_moments * moments + (1 - for_moments) * found.fetch(history.moments)
+
+    def bounds(self, sample: F64) -> tuple[F64, F64]:
+        """Mean of 7x7 pixels, fewer at the borders, minus and plus so many of their standard deviations."""
+        padded = np.pad(sample, ((3, 3), (3, 3), (0, 0)), constant_values=np.nan)
+        window = np.lib.stride_tricks.sliding_window_view(padded, (7, 7), axis=(0, 1))
+        mean = np.nanmean(window, axis=(3, 4))
+        reach = self.p.color_clamp_sigma * np.nanstd(window, axis=(3, 4))
+        return self.store(mean - reach), self.store(mean + reach)
 
     # ------------------------------------------------------------------------------------ sec. 4.2 to 4.4, in space
 
@@ -180,6 +191,9 @@ class Oracle:
         sky = packet.motion[..., 3] < 0
         deviation = self.store(np.sqrt(np.where((length < 4) & ~sky, in_space, in_time)))
         history = color
+        if self.p.prefilter:
+            smooth = self.store(self.spatial_mean(color, packet))
+            color = np.where(((length < 4) & ~sky)[..., None], smooth, color)
         for i in range(self.p.iterations):
             color, deviation = self.atrous(color, deviation, packet, i, found.length + 1)
             if i == self.p.feedback:
@@ -201,16 +215,20 @@ class Oracle:
             self._shape[dx, dy] = x, y, np.where(inside, np.exp(-np.abs(z - depth) / reach), 0.0), cosine
         return self._shape[dx, dy]
 
-    def spatial_variance(self, moments: F64, packet: FramePacket) -> F64:
+    def spatial_mean(self, image: F64, packet: FramePacket) -> F64:
+        """Of 7x7 pixels, weighted by depth and normal."""
         window = [(dx, dy) for dy in range(-3, 4) for dx in range(-3, 4)]
-        total = np.zeros((*moments.shape[:2], 1))
-        mean = np.zeros_like(moments)
+        total = np.zeros((*image.shape[:2], 1))
+        mean = np.zeros_like(image)
         for dx, dy in window:
             x, y, w_z, cosine = self._neighbour(packet, dx, dy)
             weight = (w_z * cosine**128)[..., None]
-            mean += weight * gather(moments, x, y)[0]
+            mean += weight * gather(image, x, y)[0]
             total += weight
-        mean /= np.where(total > 0, total, 1.0)
+        return np.asarray(mean / np.where(total > 0, total, 1.0))
+
+    def spatial_variance(self, moments: F64, packet: FramePacket) -> F64:
+        mean = self.spatial_mean(moments, packet)
         return np.maximum(mean[..., 1] - mean[..., 0] ** 2, 0.0)
 
     def atrous(self, color: F64, deviation: F64, packet: FramePacket, number: int, length: F64) -> tuple[F64, F64]:

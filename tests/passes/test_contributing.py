@@ -16,7 +16,7 @@ from tests.passes.harness import Bench, frame
 from tests.unit.documents import blocks
 
 EXAMPLE = {block.title: block.text for block in blocks("CONTRIBUTING.md") if block.language in ("python", "glsl")}
-PASS, SHADER, TEST = "gl/passes/firefly.py", "gl/shaders/firefly/bound.frag", "tests/passes/test_firefly.py"
+PASS, SHADER, TEST = "gl/passes/despeckle.py", "gl/shaders/despeckle/bound.frag", "tests/passes/test_despeckle.py"
 BUILDER = "gl/pipelines.py"
 
 
@@ -27,13 +27,13 @@ def run(title: str, names: dict[str, Any]) -> dict[str, Any]:
 
 
 @pytest.fixture
-def firefly(ctx: moderngl.Context, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Bench:
+def despeckle(ctx: moderngl.Context, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Bench:
     """A bench with the example among its denoisers and its shaders."""
-    module = ModuleType("gl.passes.firefly")
+    module = ModuleType("gl.passes.despeckle")
     monkeypatch.setitem(sys.modules, module.__name__, module)
     run(PASS, module.__dict__)
     builders = run(BUILDER, dict(vars(pipelines)))
-    monkeypatch.setitem(pipelines._BUILDERS, "firefly", builders["_firefly"])
+    monkeypatch.setitem(pipelines._BUILDERS, "despeckle", builders["_despeckle"])
     bench = Bench(ctx, tmp_path)
     shader = tmp_path / SHADER.removeprefix("gl/shaders/")
     shader.parent.mkdir()
@@ -41,23 +41,23 @@ def firefly(ctx: moderngl.Context, tmp_path: Path, monkeypatch: pytest.MonkeyPat
     return bench
 
 
-def test_the_example_passes_its_own_test(firefly: Bench) -> None:
+def test_the_example_passes_its_own_test(despeckle: Bench) -> None:
     names = run(TEST, {})
     tests = [value for name, value in names.items() if name.startswith("test_")]
     assert len(tests) == 1
-    tests[0](firefly)
-    firefly.release()
+    tests[0](despeckle)
+    despeckle.release()
 
 
-def test_the_example_bounds_and_leaves_the_rest(firefly: Bench) -> None:
+def test_the_example_bounds_and_leaves_the_rest(despeckle: Bench) -> None:
     """A spike goes down to its brightest neighbour, in a corner too; NaN is not spread; what is dark stays dark."""
     rng = np.random.default_rng(1)
     light = rng.uniform(0.5, 1.0, (12, 18, 1)) * (1.0, 0.5, 0.25)
     light[0, 0] = light[6, 9] = 50.0
     light[3, 3] = np.nan
     light[9:, 14:] = 0.0
-    radiance = firefly.denoise(frame((18, 12), direct=light), denoiser="firefly")["radiance"][..., :3]
-    firefly.release()
+    radiance = despeckle.denoise(frame((18, 12), direct=light), denoiser="despeckle")["radiance"][..., :3]
+    despeckle.release()
     luminance = radiance @ np.array([0.2126, 0.7152, 0.0722])
     before = light @ np.array([0.2126, 0.7152, 0.0722])
     assert np.isfinite(radiance).all()

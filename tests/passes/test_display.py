@@ -61,6 +61,36 @@ def test_as_bright_as_can_be_is_white(bench: Bench, tonemap: str, radiance: floa
     np.testing.assert_array_equal(shown, 1.0)
 
 
+@pytest.mark.parametrize("tonemap", ["none", "reinhard", "aces"])
+@pytest.mark.parametrize("exposure", [-20.0, 0.0, 20.0])
+@pytest.mark.parametrize("radiance", [-1e-3, -1.0, -3e38, np.nan, np.inf, -np.inf])
+def test_what_is_no_radiance_is_black(bench: Bench, tonemap: str, exposure: float, radiance: float) -> None:
+    """Reinhard's curve has its pole at -1, and both of ACES's polynomials have zeros below 0."""
+    config = Config(display=Display(exposure=exposure, tonemap=tonemap))
+    shown = bench.denoise(frame(SIZE, emission=radiance), config, "none")["display"]
+    np.testing.assert_array_equal(shown[..., :3], 0.0)
+
+
+@pytest.mark.parametrize("tonemap", ["none", "reinhard", "aces"])
+def test_the_curves_never_fall(bench: Bench, tonemap: str) -> None:
+    levels = np.concatenate([[0.0], np.geomspace(1e-30, 3e38, 18 * 12 - 1)]).reshape(12, 18)
+    config = Config(display=Display(tonemap=tonemap))
+    shown = bench.denoise(frame(SIZE, emission=levels), config, "none")["display"][..., 0].ravel()
+    assert (np.diff(shown) >= 0.0).all()
+    assert (shown[0], shown[-1]) == (0.0, 1.0)
+
+
+@pytest.mark.parametrize("denoiser", ["none", "svgf", "reference"])
+def test_the_other_half_of_a_split_view_is_the_frame_as_it_came(bench: Bench, denoiser: str) -> None:
+    packet = frame(SIZE, direct=picture(SIZE, 1, 4), indirect=picture(SIZE, 2), albedo=picture(SIZE, 3), emission=0.1)
+    config = Config(display=Display(exposure=-1.0, tonemap="reinhard"))
+    extra = {"frame.reference": np.full((12, 18, 4), 0.5, np.float32)}
+    whole = bench.run(packet, build(config, "none", FrameTraits()))["display"]
+    images = bench.run(packet, build(config, denoiser, FrameTraits(), split=True), extra=extra)
+    np.testing.assert_array_equal(images["noisy"], whole)
+    assert np.array_equal(images["display"], whole) == (denoiser == "none")
+
+
 @pytest.mark.parametrize("separate", [True, False])
 @pytest.mark.parametrize("demodulate", [True, False])
 def test_light_without_noise_comes_back_as_it_was(bench: Bench, separate: bool, demodulate: bool) -> None:

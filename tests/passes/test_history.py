@@ -47,6 +47,43 @@ def test_resizing_and_another_format_start_from_zero(stage: Stage) -> None:
     assert (result.histories, counted(result)) == ({"count": "format changed"}, (5, 0))
 
 
+def test_another_frame_size_counts_even_where_the_texture_s_stays(stage: Stage) -> None:
+    """A third of 13 pixels, rounded up, is that of 15: what the texels stand for has changed all the same."""
+    (stage.root / "thirds.frag").write_text("""
+        uniform sampler2D prev_color;
+        uniform bool u_history_valid;
+        layout(location = 0) out vec4 out_color;
+        void main() {
+            out_color = u_history_valid ? texelFetch(prev_color, ivec2(gl_FragCoord.xy), 0) + 1.0 : vec4(1.0);
+        }
+    """)
+
+    class Thirds(FragmentPass):
+        shader = "thirds.frag"
+        prev_color = Prev("count")
+        out_color = Out("rgba32f", "count", divisor=3)
+
+    def plan() -> Plan:
+        g = Graph()
+        history = g.history("thirds", "rgba32f", divisor=3)
+        thirds = g.add(Thirds(), prev_color=history)
+        g.feed(history, thirds.out_color)
+        g.output("display", thirds.out_color)
+        return g.compile()
+
+    reasons = []
+    for width in (13, 13, 15, 15, 16):
+        result = stage.run(plan(), size=(width, 7))
+        reasons.append((result.outputs["display"].width, result.histories["thirds"], pixels(result.outputs["display"])))
+    assert [(width, why, values.max()) for width, why, values in reasons] == [
+        (5, "first use", 1),
+        (5, "valid", 2),
+        (5, "resized", 1),
+        (5, "valid", 2),
+        (6, "resized", 1),
+    ]
+
+
 def test_a_frame_that_failed_has_fed_nothing(stage: Stage) -> None:
     stage.run(count_plan())
     with pytest.raises(GraphError):

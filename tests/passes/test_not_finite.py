@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from config import Config, Svgf, Taa
+from config import Config, Firefly, Svgf, Taa
 from gl.graph import Graph
 from gl.passes.temporal import Accumulate, Guides, reproject
 from raytrace.frame import FramePacket
@@ -39,6 +39,11 @@ FILTERS = {
     "unfiltered feedback": svgf(feedback_level=-1),
     "late feedback": svgf(feedback_level=4),
     "with albedo": svgf(demodulate=False),
+    "prefiltered": svgf(prefilter=True),
+    "prefiltered in space only": svgf(prefilter=True, temporal=False),
+    "clamped": svgf(color_clamp=True),
+    "without fireflies": Config(firefly=Firefly(mode="variance")),
+    "bounded": Config(firefly=Firefly(mode="clamp")),
 }
 
 
@@ -231,3 +236,20 @@ def test_in_the_picture_before_anti_aliasing(bench: Bench, value: float) -> None
     for index in range(5):
         images = bench.run(frame(SIZE), anti_aliasing(p), extra={"frame.color": bad if index == 2 else good})
     np.testing.assert_allclose(images["color"][..., :3], 0.5, rtol=1e-3)
+
+
+@pytest.mark.parametrize("first", [True, False], ids=["without a history", "with one"])
+def test_a_colour_that_there_is_not_leaves_no_trace(bench: Bench, first: bool) -> None:
+    """The tone map makes black of it, with alpha 0: the history is shown, or what comes next is taken whole."""
+    p = Taa(alpha=0.1, clip=False)
+    good = np.ones((33, 31, 4), np.float32)
+    good[..., :3] = 0.5
+    none = good.copy()
+    for y, x in SPOILED:
+        none[y, x] = 0.0
+    for index in range(1 if first else 3):
+        bench.run(frame(SIZE), anti_aliasing(p), extra={"frame.color": none if index == 0 and first else good})
+    during = bench.run(frame(SIZE), anti_aliasing(p), extra={"frame.color": none})["color"]
+    after = bench.run(frame(SIZE), anti_aliasing(p), extra={"frame.color": good})["color"]
+    np.testing.assert_array_equal(during[5, 7], (0.0,) * 4 if first else (0.5, 0.5, 0.5, 1.0))
+    np.testing.assert_allclose(after, good, rtol=1e-3)

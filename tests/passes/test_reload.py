@@ -2,10 +2,19 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
+import moderngl
+import numpy as np
 import pytest
 
+from gl.graph import Graph
+from gl.programs import FULLSCREEN
+from gl.renderer import Renderer
 from gl.shader import ShaderError
-from tests.passes.stage import SHADERS, Stage, add_plan, fill_plan, pixels
+from gl.variants import variants
+from tests.passes.stage import SHADERS, SIZE, Index, Place, Stage, add_plan, fill_plan, pixels
 
 
 def test_compile_errors_carry_the_real_file_and_line(stage: Stage) -> None:
@@ -63,3 +72,93 @@ def test_reload_replaces_what_changed_and_keeps_the_last_good_program(stage: Sta
     assert executor.reload_shaders() == [error]  # still wrong, and not compiled again
     (stage.root / "common/late.glsl").write_text("float late() { return 7.0; }\n")
     assert (executor.reload_shaders(), value()) == ([], 7)
+
+
+def save(file: Path, text: str) -> None:
+    """As editors do: written beside it, then moved over it."""
+    beside = file.with_name(f".{file.name}.swp")
+    beside.write_text(text)
+    beside.replace(file)
+
+
+def test_what_includes_a_file_is_reloaded_with_it_and_nothing_else(stage: Stage) -> None:
+    save(stage.root / "common/level.glsl", "float level() { return 1.0; }\n")
+    save(
+        stage.root / "add.frag", '#include "common/level.glsl"\n' + SHADERS["add.frag"].replace("* FACTOR", "* level()")
+    )
+    plan = add_plan()
+    assert pixels(stage.run(plan).outputs["display"]).max() == 1
+    assert stage.executor.shaders_changed(), "a file has come since the executor was made"
+    assert stage.executor.reload_shaders() == []
+    assert not stage.executor.shaders_changed()
+    first = {node.name: stage.executor._programs.get(node) for node in plan.passes}
+    save(stage.root / "common/level.glsl", "float level() { return 6.0; }\n")
+    assert stage.executor.shaders_changed()
+    assert stage.executor.reload_shaders() == []
+    assert not stage.executor.shaders_changed()
+    assert pixels(stage.run(plan).outputs["display"]).max() == 6
+    second = {node.name: stage.executor._programs.get(node) for node in plan.passes}
+    assert (second["fill"] is first["fill"], second["add"] is first["add"]) == (True, False)
+
+
+def test_a_compute_shader_is_reloaded(stage: Stage) -> None:
+    g = Graph()
+    g.output("id", g.add(Index(), in_index=g.add(Place()).out_index).out_id)
+    plan, file = g.compile(), stage.root / "index.comp"
+
+    def corner() -> int:
+        return int(np.asarray(pixels(stage.run(plan).outputs["id"]))[-1, -1, 0])
+
+    right, top = SIZE[0] - 1, SIZE[1] - 1
+    assert corner() == 1000 * top + right
+    save(file, SHADERS["index.comp"].replace("1000 *", "500 *"))
+    assert (stage.executor.reload_shaders(), corner()) == ([], 500 * top + right)
+    save(file, SHADERS["index.comp"].replace("1000 *", "1000 ** 2 *"))
+    (error,) = stage.executor.reload_shaders()
+    assert re.search(r"^index\.comp:10: ", str(error), re.MULTILINE)
+    assert corner() == 500 * top + right
+    save(file, SHADERS["index.comp"].replace("r32ui,", "rg32ui,"))
+    (error,) = stage.executor.reload_shaders()
+    assert str(error).startswith("index.comp:5: 'out_id' does not match Index")
+    assert corner() == 500 * top + right
+    save(file, SHADERS["index.comp"])
+    assert (stage.executor.reload_shaders(), corner()) == ([], 1000 * top + right)
+
+
+def test_the_vertex_shader_is_reloaded_with_every_fragment_pass(stage: Stage) -> None:
+    file = stage.root / FULLSCREEN
+    whole = file.read_text()
+
+    def color(value: float) -> float:
+        return float(pixels(stage.run(fill_plan((value,) * 4)).outputs["display"]).max())
+
+    assert color(1.0) == 1.0
+    save(file, "void main() { gl_Position = vec4(2.0); }\n")  # nothing is drawn: what was there stays
+    assert (stage.executor.reload_shaders(), color(2.0)) == ([], 1.0)
+    save(file, "void main() { gl_Position = vec4(2.0) }\n")
+    (error,) = stage.executor.reload_shaders()
+    assert f"{FULLSCREEN}:1: " in str(error)
+    save(file, whole)
+    assert (stage.executor.reload_shaders(), color(3.0)) == ([], 3.0)
+
+
+def test_what_was_prepared_with_the_former_program_is_so_no_longer(stage: Stage) -> None:
+    wanted = variants(add_plan(), SIZE)
+    for node in wanted.values():
+        stage.executor.prepare(node, SIZE)
+    assert stage.executor.unprepared(wanted) == {}
+    save(stage.root / "add.frag", SHADERS["add.frag"].replace("* FACTOR", "* oops"))
+    assert len(stage.executor.reload_shaders()) == 1
+    assert stage.executor.unprepared(wanted) == {}, "the last good program stays"
+    save(stage.root / "add.frag", SHADERS["add.frag"])
+    assert stage.executor.reload_shaders() == []
+    assert [node.name for node in stage.executor.unprepared(wanted).values()] == ["add"]
+
+
+def test_the_renderer_reloads_its_shaders(ctx: moderngl.Context, monkeypatch: pytest.MonkeyPatch) -> None:
+    error = ShaderError("display/encode.frag:3: oops")
+    renderer = Renderer(ctx)
+    assert renderer.reload_shaders() == []
+    monkeypatch.setattr(renderer.executor, "reload_shaders", lambda: [error])
+    assert renderer.reload_shaders() == [error]
+    renderer.release()

@@ -16,7 +16,7 @@ from gl.renderer import Renderer, read
 from tests.passes.harness import frame, noise
 
 SIZE = (18, 12)
-PACKET = replace(frame(SIZE, direct=noise(SIZE, 1), indirect=0.5), scene="a", cut=False)
+PACKET = replace(frame(SIZE, direct=noise(SIZE, 1), indirect=0.5), scene_id=1, cut=False)
 
 
 @pytest.fixture
@@ -36,13 +36,14 @@ def why(renderer: Renderer, **changes: object) -> str:
 def test_what_empties_the_histories(renderer: Renderer) -> None:
     assert why(renderer) == "first use"
     assert why(renderer) == "valid"
-    assert why(renderer, index=7, time=9.0) == "valid"  # frame numbers and times say nothing
+    assert why(renderer, time=9.0) == "valid"  # times say nothing
     assert why(renderer, cut=True) == "reset: camera cut"
     assert why(renderer) == "valid"
-    assert why(renderer, scene="b") == "reset: another scene"
-    assert why(renderer, scene="b") == "valid"
+    assert why(renderer, scene="renamed") == "valid"
+    assert why(renderer, scene_id=2) == "reset: another scene"  # of the same name
+    assert why(renderer, scene_id=2) == "valid"
     assert why(renderer) == "reset: another scene"
-    packet = replace(frame((19, 12)), scene="a")
+    packet = replace(frame((19, 12)), scene_id=1)
     assert set(renderer.run(packet, Config(), "svgf").histories.values()) == {"resized"}
     assert why(renderer) == "resized"
     assert set(renderer.run(PACKET, Config(), "svgf", reset="key").histories.values()) == {"reset: key"}

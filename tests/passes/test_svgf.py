@@ -63,6 +63,7 @@ def test_a_constant_stays_constant_at_any_size(bench: Bench, size: Size) -> None
         without_taa(feedback_level=-1),
         without_taa(feedback_level=2, sigma_n=100),
         without_taa(iterations=8, feedback_level=7),
+        without_taa(prefilter=True, color_clamp=True),
     ],
     ids=lambda c: "-".join(f"{k}={v}" for k, v in vars(c.svgf).items() if v != getattr(Svgf(), k)),
 )

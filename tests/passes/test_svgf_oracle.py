@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from config import Config, Svgf, Taa
+from config import Config, Svgf, Taa, load
 from raytrace.frame import FramePacket
 from tests.passes.harness import HALF, PAPER, Bench
 from tests.passes.room import room
@@ -35,8 +35,12 @@ def difference(image: NDArray[np.float32], expected: NDArray[np.float64], packet
             separate=False, feedback_level=2, iterations=3, sigma_l=1.0, sigma_z=0.5, alpha=0.5, normal_tolerance=0.99
         ),
         Svgf(separate=False, demodulate=False, variance_guided=False, depth_tolerance=0.001),
+        load(None, ("svgf.preset=reference",)).svgf,
+        Svgf(separate=False, prefilter=True, feedback_level=-1),
+        Svgf(separate=False, color_clamp=True),
+        Svgf(separate=False, color_clamp=True, color_clamp_sigma=0.25, iterations=1),
     ],
-    ids=["default", "paper", "running mean", "short", "unguided"],
+    ids=["default", "paper", "running mean", "short", "unguided", "reference", "prefilter", "clamped", "clamped hard"],
 )
 def test_every_frame_agrees_with_double_precision(bench: Bench, p: Svgf) -> None:
     """With the same roundings to half precision only those values differ that fall on the other side of a rounding."""
@@ -74,7 +78,7 @@ def test_the_flight_keeps_its_histories_and_loses_some(bench: Bench) -> None:
         packet = room(index, SIZE)
         values = bench.denoise(packet, replace(Config(), taa=Taa(enabled=False)), keep=keep)[keep[0]]
         surface = packet.motion[..., 3] >= 0
-        masks.append(values[surface][:, 2].astype(int))
+        masks.append(np.maximum(values[surface][:, 2], 0.0).astype(int))  # below 0 is a reason, not a mask
         lengths.append(values[surface][:, 3])
     assert not masks[0].any()
     mask = np.concatenate(masks[1:])

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 import assets
 from bench.metrics import rmse, temporal_difference
-from config import Config, Svgf, Taa, load
+from config import Config, Firefly, Svgf, Taa, load
 from gl.renderer import Renderer, read
 from raytrace.compiled import compile_scene
 from raytrace.frame import FramePacket
@@ -70,11 +70,12 @@ class Score(NamedTuple):
     energy: float
 
 
-def score(ctx: moderngl.Context, case: Case, denoiser: str, parameters: Svgf) -> Score:
+def score(ctx: moderngl.Context, case: Case, denoiser: str, parameters: Svgf, firefly: Firefly | None = None) -> Score:
     renderer = Renderer(ctx)
+    config = Config(svgf=parameters, taa=Taa(enabled=False), firefly=firefly or Firefly())
     images: list[F32] = []
     for packet in case.packets:
-        result = renderer.run(packet, Config(svgf=parameters, taa=Taa(enabled=False)), denoiser)
+        result = renderer.run(packet, config, denoiser)
         if packet.index >= LAST - 1:
             images.append(read(result.outputs["radiance"])[..., :3])
     renderer.release()
@@ -118,6 +119,32 @@ def test_the_paper_s_parameters_do_nearly_as_well(ctx: moderngl.Context, case: C
     assert whole.error < paper.error < 0.21
     assert paper.flicker < 0.06
     assert paper.energy == pytest.approx(1.0, abs=0.03)
+
+
+def test_the_constants_of_the_known_implementation_trade_error_for_calm(
+    ctx: moderngl.Context, case: Case, whole: Score
+) -> None:
+    """What the second iteration has blurred is fed back, and hardly anything new with it: shadows wash out."""
+    reference = score(ctx, case, "svgf", load(None, ("svgf.preset=reference",)).svgf)
+    assert 1.5 * whole.error < reference.error < 0.45
+    assert reference.flicker < whole.flicker
+    assert reference.energy == pytest.approx(1.0, abs=0.03)
+
+
+def test_a_clamped_history_costs_little_where_no_light_changes(ctx: moderngl.Context, case: Case, whole: Score) -> None:
+    clamped = score(ctx, case, "svgf", Svgf(color_clamp=True))
+    assert clamped.error < 1.1 * whole.error
+    assert clamped.flicker < 1.1 * whole.flicker
+    assert clamped.energy == pytest.approx(whole.energy, abs=0.01)
+
+
+@pytest.mark.parametrize("firefly", [Firefly("clamp", max_radiance=1.0), Firefly("variance")], ids=lambda p: p.mode)
+def test_rejecting_fireflies_takes_little_of_the_light(ctx: moderngl.Context, case: Case, firefly: Firefly) -> None:
+    """In the noisy frame itself."""
+    plain = score(ctx, case, "none", Svgf())
+    cut = score(ctx, case, "none", Svgf(), firefly)
+    assert 0.985 * plain.energy < cut.energy < plain.energy
+    assert cut.error < plain.error
 
 
 def test_both_signals_together_do_nearly_as_well(ctx: moderngl.Context, case: Case) -> None:

@@ -20,7 +20,7 @@ from bench.methods import METHODS, NOISY, MethodResult, PassTime, QualityResult,
 from bench.references import Reference
 from bench.report import GOALS, Report
 from bench.timing import Summary
-from config import Config
+from config import Config, load
 from errors import UserError
 from gl.renderer import Renderer
 from raytrace.frame import FramePacket
@@ -353,3 +353,10 @@ def test_methods_change_only_what_is_theirs(separate):
     assert not methods.APART.configure(config).taa.enabled
     assert methods.APART_TAA.configure(config).taa == config.taa
     assert NOISY.configure(config).svgf == config.svgf
+
+
+def test_a_method_with_a_preset_has_all_of_it_and_nothing_of_the_user_s():
+    own = load(None, ["svgf.prefilter=true", "svgf.max_history=20", "svgf.iterations=2"])
+    for preset in ("paper", "reference"):
+        (method,) = [method for method in METHODS if method.preset == preset]
+        assert method.configure(own).svgf == load(None, [f"svgf.preset={preset}"]).svgf

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from config import PRESETS, SECTIONS, Config, Svgf, describe, load, parameters
+from config import PRESETS, SECTIONS, Config, Svgf, apply_preset, describe, load, parameters, preset_values
 from errors import UserError
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -87,8 +87,8 @@ def test_bounds_are_inclusive_and_hold(name):
         ("svgf.iterations=99", r"--set svgf.iterations=99: must be in \[0;8\], not 99"),
         ("svgf.alhpa=1", "--set svgf.alhpa=1: unknown key, did you mean 'alpha'?"),
         ("svfg.alpha=1", "--set svfg.alpha=1: unknown section 'svfg', did you mean 'svgf'?"),
-        ("zzzzzz.alpha=1", "known are render, svgf, taa, display"),
-        ("svgf.zzzz=1", "unknown key; known are preset, alpha,"),
+        ("zzzzzz.alpha=1", "known are render, firefly, svgf, bmfr, taa, display"),
+        ("svgf.zzzz=1", "unknown key; known are preset, separate,"),
         ("iterations=3", "must be section.key=value, did you mean 'svgf.iterations'?"),
         ("svgf.iterations", "must be section.key=value, as in"),
         ("svgf.=3", "must be section.key=value, as in"),
@@ -109,7 +109,7 @@ def test_bounds_are_inclusive_and_hold(name):
         ("svgf.temporal=True", 'must be true or false, not "True"'),
         ("render.sequence=hasch", """must be "halton" | "hash", not "hasch", did you mean 'hash'?"""),
         ("render.jitter=true", 'must be "auto" | "on" | "off", not true'),
-        ("svgf.preset=bost", 'must be "paper" | "best", not "bost", did you mean \'best\'?'),
+        ("svgf.preset=bost", 'must be "paper" | "reference" | "best", not "bost", did you mean \'best\'?'),
     ],
 )
 def test_wrong_overrides_say_what_is_wrong(override, message):
@@ -122,7 +122,7 @@ def test_wrong_overrides_say_what_is_wrong(override, message):
     [
         ("[svgf]\nalhpa = 0.1", "some.toml [svgf] alhpa: unknown key, did you mean 'alpha'?"),
         ("[svfg]\nalpha = 0.1", "some.toml [svfg]: unknown section, did you mean 'svgf'?"),
-        ("alpha = 0.1", "some.toml alpha: stands outside a section; sections are render, svgf, taa, display"),
+        ("alpha = 0.1", "some.toml alpha: stands outside a section; sections are render, firefly, svgf, bmfr, taa, "),
         ("svgf = 3", "some.toml [svgf]: must be a section, written [svgf] on a line of its own"),
         ("[[svgf]]\nalpha = 0.1", "some.toml [svgf]: must be a section"),
         ("[svgf]\nalpha = 2", "some.toml [svgf] alpha: must be in [0;1], not 2 (smallest share of the new frame"),
@@ -183,6 +183,38 @@ def test_presets_hold_valid_values_and_are_choices(section, preset):
     assert SECTIONS[section](preset=preset, **values)  # type: ignore[call-arg]  # raises if a value is none
 
 
+PAIRS = [(s, a, b) for s, presets in PRESETS.items() for a in presets for b in presets]
+
+
+@pytest.mark.parametrize(("section", "before", "after"), PAIRS, ids=lambda part: part)
+def test_a_change_of_preset_ends_where_a_start_with_it_begins(section, before, after):
+    """Nothing of the preset before is left, though some presets give only the keys in which they differ."""
+    started = load(None, [f"{section}.preset={before}"])
+    assert apply_preset(started, section, after) == load(None, [f"{section}.preset={after}"])
+
+
+def test_a_preset_owns_what_any_of_its_section_owns(monkeypatch):
+    monkeypatch.setitem(PRESETS, "taa", {"one": {"alpha": 0.5}, "two": {"clip": False}})
+    assert preset_values("taa", "one") == {"alpha": 0.5, "clip": True}
+    assert preset_values("taa", "two") == {"alpha": 0.1, "clip": False}
+
+
+def test_a_change_of_preset_takes_its_keys_and_leaves_the_others():
+    values = ["svgf.alpha=0.7", "svgf.color_clamp=true", "svgf.depth_tolerance=0.5", "display.exposure=2"]
+    before = load(None, ["svgf.preset=paper", *values])
+    after = apply_preset(before, "svgf", "reference")
+    assert (before.svgf.alpha, after.svgf.alpha, after.svgf.preset) == (0.7, 0.05, "reference")
+    assert (after.svgf.color_clamp, after.svgf.depth_tolerance) == (True, 0.5)
+    assert (after.display, after.taa) == (before.display, before.taa)
+
+
+def test_presets_that_are_not_there_are_user_errors():
+    with pytest.raises(UserError, match=r"\[svgf\] preset: unknown preset 'bost', did you mean 'best'\?"):
+        apply_preset(Config(), "svgf", "bost")
+    with pytest.raises(UserError, match=r"\[taa\]: has no presets"):
+        apply_preset(Config(), "taa", "best")
+
+
 def test_the_first_preset_of_a_section_equals_the_defaults():
     for section, presets in PRESETS.items():
         specs = parameters(SECTIONS[section])
@@ -227,5 +259,7 @@ def test_the_shipped_file_lists_every_key_with_default_range_and_meaning():
 def test_the_shipped_file_leaves_to_the_preset_what_the_preset_owns():
     text = (ROOT / "config.toml").read_text()
     assert load(ROOT / "config.toml") == Config()
-    for key in PRESETS["svgf"]["paper"]:
-        assert f"\n# {key} = " in text
+    for section in PRESETS:
+        table = text.partition(f"\n[{section}]")[2].partition("\n[")[0]
+        for key in preset_values(section, "best"):
+            assert f"\n# {key} = " in table

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-COMMANDS = {"app", "cli", "demo", "doctor", "headless", "session"}
+COMMANDS = {"app", "cli", "demo", "doctor", "explain", "headless", "session"}
 HELPERS = {"config", "console", "errors", "images", "storage"}
 OURS = COMMANDS | HELPERS | {"assets", "bench", "gl", "raytrace", "tests", "tools", "ui"}
 OPENGL = {"moderngl", "glcontext", "OpenGL"}
@@ -43,9 +43,14 @@ LAYERS = [
     layer("assets", "assets raytrace errors", OPENGL | EMBREE | WINDOWS),
     layer("raytrace", "raytrace config errors", OPENGL | WINDOWS),
     layer("gl", "gl raytrace.frame config errors", EMBREE | WINDOWS),
-    layer("ui", "ui gl raytrace config console errors images session", EMBREE),
+    layer("ui", "ui assets gl raytrace config console errors images session", EMBREE),
     layer("bench", "assets bench gl raytrace config console errors session storage", OPENGL | WINDOWS | {"embreex"}),
-    layer("app.py", "assets bench cli config demo doctor errors gl headless raytrace ui", OPENGL | EMBREE | WINDOWS),
+    layer(
+        "app.py",
+        "assets bench cli config demo doctor errors explain gl headless raytrace ui",
+        OPENGL | EMBREE | WINDOWS,
+    ),
+    layer("explain.py", "config gl raytrace session ui.state", OPENGL | EMBREE | WINDOWS),
     layer("tools", "tools assets bench cli config errors gl images raytrace session ui.keys", WINDOWS),
 ]
 

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import pytest
 
-from gl.graph import Graph, GraphError, Tex
-from gl.plan import Slot, check_no_feedback
+from config import Render, parameters
+from gl.graph import ONE_TEXEL, Graph, GraphError, Out, Tex
+from gl.plan import Slot, check_no_feedback, texture_bytes, texture_size
 from tests.unit.small_graphs import COLOR, Blur, Show, Source, Temporal, Tiles, blur, example
 
 # --------------------------------------------------------------------------------------------- culling and histories
@@ -109,6 +110,17 @@ def test_slots_are_shared_by_equal_format_and_divisor_only() -> None:
         Slot("rg32f", 3, 0),
         Slot("r32f", 1, 0),
     )
+
+
+def test_one_texel_is_one_texel_in_every_frame_there_can_be() -> None:
+    largest = int(parameters(Render)["width"].hi or 0), int(parameters(Render)["height"].hi or 0)
+    for size in ((1, 1), (640, 360), largest):
+        assert texture_size(size, ONE_TEXEL) == (1, 1)
+        assert texture_bytes(size, "rg32f", ONE_TEXEL) == 8
+    g = Graph()
+    mean = type("Mean", (Tiles,), {"out_small": Out("r32f", "s", ONE_TEXEL)})
+    g.output("a", g.add(mean(), in_color=g.import_("noisy", COLOR)).out_small)
+    assert "out_small:r32f(1x1)@0" in g.compile().text()
 
 
 def test_outputs_kept_textures_and_feeders_are_never_written_over() -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from config import Config, Svgf, Taa, load
+from config import Config, Display, Firefly, Svgf, Taa, load
 from gl.pipelines import DENOISERS, FrameTraits, build
 from gl.plan import Plan, check_no_feedback
 
@@ -27,6 +27,10 @@ CASES: dict[str, tuple[Config, str, FrameTraits]] = {
     "accumulate": (Config(), "accumulate", FrameTraits()),
     "svgf": (Config(), "svgf", FrameTraits()),
     "svgf_paper": (load(None, ("svgf.preset=paper",)), "svgf", FrameTraits()),
+    "svgf_reference": (load(None, ("svgf.preset=reference",)), "svgf", FrameTraits()),
+    "svgf_color_clamp": (svgf(color_clamp=True), "svgf", FrameTraits()),
+    "firefly_clamp": (Config(firefly=Firefly(mode="clamp")), "none", FrameTraits()),
+    "firefly_variance": (Config(firefly=Firefly(mode="variance")), "accumulate", FrameTraits()),
     "svgf_joint": (svgf(separate=False), "svgf", FrameTraits()),
     "svgf_without_temporal": (svgf(temporal=False), "svgf", FrameTraits()),
     "svgf_without_variance": (svgf(variance_guided=False), "svgf", FrameTraits()),
@@ -37,13 +41,23 @@ CASES: dict[str, tuple[Config, str, FrameTraits]] = {
     "svgf_unfiltered_feedback": (svgf(feedback_level=-1), "svgf", FrameTraits()),
     "svgf_late_feedback": (svgf(feedback_level=2), "svgf", FrameTraits()),
     "svgf_without_taa": (replace(Config(), taa=Taa(enabled=False)), "svgf", FrameTraits()),
+    "bmfr": (Config(), "bmfr", FrameTraits()),
+    "bmfr_paper": (load(None, ("bmfr.preset=paper",)), "bmfr", FrameTraits()),
+    "bmfr_reference": (load(None, ("bmfr.preset=reference",)), "bmfr", FrameTraits()),
+    "bmfr_albedo": (load(None, ("bmfr.features=\"1,albedo,w\"",)), "bmfr", FrameTraits()),
+    "bmfr_moving": (Config(), "bmfr", FrameTraits(moving=True)),
+    "bmfr_on_hardware": (Config(), "bmfr", FrameTraits(software=False)),
     "svgf_moving": (Config(), "svgf", FrameTraits(moving=True)),
+    "accumulate_auto_exposure": (Config(display=Display(auto_exposure=True)), "accumulate", FrameTraits()),
+    "accumulate_mark_bad": (Config(display=Display(mark_bad="on")), "accumulate", FrameTraits()),
+    "accumulate_split": (Config(), "accumulate", FrameTraits()),
+    "svgf_split": (Config(display=Display(auto_exposure=True, mark_bad="on")), "svgf", FrameTraits()),
 }
 
 
 def plan_of(case: str) -> Plan:
     config, denoiser, traits = CASES[case]
-    return build(config, denoiser, traits).compile()
+    return build(config, denoiser, traits, split=case.endswith("_split")).compile()
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -115,6 +129,30 @@ def test_a_stage_that_is_off_costs_nothing() -> None:
     assert not any(plan_of(case).culled for case in CASES)
     assert plan_of("none").feeds == {}
     assert [history.name for history in plan_of("svgf_without_temporal").feeds.values()] == ["taa.svgf"]
+
+
+@pytest.mark.parametrize("mode", ["clamp", "variance"])
+@pytest.mark.parametrize("denoiser", DENOISERS)
+def test_fireflies_are_rejected_before_anything_else(denoiser: str, mode: str) -> None:
+    """By every method but the mean of many paths: no pass reads the noisy samples but those that cut them."""
+    config = replace(Config(), firefly=Firefly(mode=mode))
+    plan = build(config, denoiser, FrameTraits()).compile()
+    noisy = {"frame.direct", "frame.indirect"}
+    readers = [node.name for node in plan.passes if noisy & {tex.name for tex in node.reads.values()}]
+    assert readers == ([] if denoiser == "reference" else ["firefly.direct", "firefly.indirect"])
+
+
+def test_what_the_display_leaves_out_costs_nothing() -> None:
+    def added(case: str) -> set[str]:
+        return {name for name in names(case) if name not in names("accumulate")}
+
+    assert added("accumulate_auto_exposure") == {"exposure.log_luminance", "exposure.adapt"}
+    assert added("accumulate_mark_bad") == {"mark_bad"}
+    assert added("accumulate_split") == {"noisy.modulate", "noisy.tonemap", "noisy.encode"}
+    assert plan_of("accumulate").outputs.keys() == {"radiance", "display"}
+    assert plan_of("svgf_split").outputs.keys() == {"radiance", "display", "bad", "noisy"}
+    small = plan_of("accumulate_auto_exposure").bytes((640, 360)) - plan_of("accumulate").bytes((640, 360))
+    assert small == 20 * 12 * 8 + 2 * 4  # sums of tiles, and one texel twice
 
 
 def test_only_what_is_needed_is_uploaded() -> None:

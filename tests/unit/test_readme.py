@@ -226,7 +226,7 @@ def test_links_lead_somewhere(document, target):
 def test_files_that_are_named_exist(document):
     """Code spans with a folder and an ending; `out/` is made by running, the example's files are not in the tree."""
     spans = re.findall(r"`([\w./-]+/[\w.-]*)`", prose(document))
-    named = [span for span in spans if not re.match(r"out/|\.cache/|path/to/|.*firefly", span)]
+    named = [span for span in spans if not re.match(r"out/|\.cache/|path/to/|.*despeckle", span)]
     roots = (ROOT, (ROOT / document).parent, ROOT / "gl" / "shaders")
     assert [span for span in named if not any((root / span).exists() for root in roots)] == []
 

@@ -20,12 +20,18 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image, ImageGrab, features
 
+from config import load
+from gl.pipelines import FrameTraits, build
+
 F32 = NDArray[np.float32]
 T = TypeVar("T")
 
 ROOT = Path(__file__).resolve().parents[2]
 START_SECONDS = 180.0  # the first start ever compiles the tracer's kernels
-SECONDS = 20.0  # for anything else; reached only if something is wrong
+SECONDS = 30.0  # for anything else; reached only if something is wrong
+
+STILL = 0.004
+"""Mean difference of two filtered pictures of the same view: what noise is left. Measured: 0.0006 to 0.0024."""
 
 
 def require_tools() -> None:
@@ -47,6 +53,24 @@ def wait_for(condition: Callable[[], T], what: str, seconds: float = SECONDS) ->
         if time.monotonic() > end:
             pytest.fail(f"waited {seconds:.0f} s in vain for {what}")
         time.sleep(0.05)
+
+
+def plan(denoiser: str, *settings: str) -> list[str]:
+    """The passes of a frame of the Cornell box, whose objects move, by their names."""
+    built = build(load(None, settings), denoiser, FrameTraits(moving=True))
+    return [node.name for node in built.compile().passes]
+
+
+def difference(one: F32, other: F32) -> float:
+    """Mean absolute difference of two pictures of the same size."""
+    return float(np.abs(one - other).mean())
+
+
+def roughness(picture: F32) -> float:
+    """Mean difference between a pixel and the mean of its four neighbours: noise is rough, a filtered wall is not."""
+    inner = picture[1:-1, 1:-1]
+    around = picture[:-2, 1:-1] + picture[2:, 1:-1] + picture[1:-1, :-2] + picture[1:-1, 2:]
+    return float(np.abs(inner - around / 4).mean())
 
 
 @contextmanager
@@ -132,10 +156,39 @@ class App:
         with Image.open(new.pop()) as image:
             return np.asarray(image, dtype=np.float32) / 255.0
 
+    def settled(self) -> F32:
+        """The picture once enough frames have gone into it that it no longer changes."""
+        pictures = [self.picture() for _ in range(3)]
+
+        def calm() -> bool:
+            pictures.append(self.picture())
+            return difference(pictures[-4], pictures[-1]) < STILL / 2
+
+        wait_for(calm, "a picture that stands still")
+        return pictures[-1]
+
     def screen(self) -> F32:
         """The same of the whole X screen."""
         image = ImageGrab.grab(xdisplay=self.display).convert("RGB")
         return np.asarray(image, dtype=np.float32) / 255.0
+
+    def hear(self, pattern: str, since: int = 0, seconds: float = SECONDS) -> re.Match[str]:
+        """Where ``pattern`` matches what was printed after the first ``since`` characters; waits for it."""
+        return wait_for(lambda: re.compile(pattern, re.MULTILINE).search(self.stdout(), since), repr(pattern), seconds)
+
+    def ask(self, key: str, pattern: str) -> re.Match[str]:
+        """Press ``key`` and wait until a line is printed that ``pattern`` matches."""
+        since = len(self.stdout())
+        self.press(key)
+        return self.hear(pattern, since)
+
+    def passes(self) -> list[str]:
+        """The passes of the frame shown, as ``--log`` last told them."""
+        return re.findall(r"pass(?:es)?: (.*)", self.stdout())[-1].split()
+
+    def await_passes(self, expected: list[str]) -> None:
+        """Until frames run through exactly these passes, which may have to be compiled first."""
+        wait_for(lambda: self.passes() == expected, f"the passes {' '.join(expected)}")
 
     def processor_seconds(self) -> float:
         """What the program has used so far, all threads together."""
@@ -194,9 +247,13 @@ def running(display: str, folder: Path, *command: str) -> Iterator[App]:
 
 
 @contextmanager
-def application(display: str, folder: Path, *flags: str) -> Iterator[App]:
-    """``app.py`` with its window, small, on ``display``; screenshots and output go to ``folder``."""
-    command = ("app.py", "--size", "160x90", "--out", str(folder / "out"), *flags)
+def application(display: str, folder: Path, *flags: str, size: str = "160x90") -> Iterator[App]:
+    """``app.py`` with its window on ``display``, without panel; screenshots and what it tells go to ``folder``.
+
+    ``size``: of the picture; "": the program finds one that is shown fluently.
+    """
+    sized = ("--size", size) if size else ()
+    command = ("app.py", *sized, "--no-hud", "--log", "--out", str(folder / "out"), *flags)
     with running(display, folder, *command) as app:
         app.await_picture()
         yield app

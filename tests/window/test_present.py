@@ -10,7 +10,8 @@ from PIL import Image
 from gl.renderer import read
 from ui.glfw_window import first_size
 from ui.present import Presenter, letterbox
-from ui.window import Title, save_screenshot
+from ui.screenshot import save_screenshot
+from ui.title import Pace, Title
 
 
 @pytest.mark.parametrize(
@@ -103,13 +104,35 @@ def test_a_screenshot_that_cannot_be_written_is_told(tmp_path, capsys):
     assert "cannot be written" in capsys.readouterr().err
 
 
+def test_two_pictures_share_the_window_at_a_column(ctx, presenter):
+    right = ctx.texture((8, 4), 4, np.full((4, 8, 4), 255, np.uint8).tobytes())
+    left = ctx.texture((8, 4), 4, np.zeros((4, 8, 4), np.uint8).tobytes())
+    screen = ctx.texture((16, 8), 4)
+    target = ctx.framebuffer([screen])
+    for split, dark in ((5, 5), (0, 0), (-3, 0), (99, 16)):
+        presenter.draw(right, target, (16, 8), left, split)
+        drawn = read(screen)[..., 0]
+        assert (drawn[:, :dark] == 0.0).all()
+        line = drawn[:, dark : dark + 1]
+        assert 0 < split < 16 or (line == 1.0).all()
+        assert (drawn[:, dark + 1 :] == 1.0).all()
+    presenter.draw(right, target, (16, 8))
+    assert read(screen)[..., 0].min() == 1.0, "nothing is cut off afterwards"
+    ctx.detect_framebuffer(0).use()
+    for item in (target, screen, left, right):
+        item.release()
+
+
 def test_the_title_tells_what_is_shown_and_does_not_flicker():
-    title = Title("cornell", "llvmpipe")
+    title, pace = Title("llvmpipe"), Pace()
+    assert title.update(98.0, "cornell", "svgf", pace, "").startswith("cornell · svgf · 0.0 fps")
     for frame in range(4):
-        title.count(99.0 + frame / 4, 12.0)
-    first = title.update(100.0, "svgf + TAA", 34.4, "")
-    assert first == "cornell · svgf + TAA · 4.0 fps · tracing 12 ms · filtering 34 ms · llvmpipe"
-    assert title.update(100.1, "svgf + TAA", 50.0, "") == ""
-    assert title.update(100.2, "none", 50.0, "history reset").startswith("history reset · cornell · none")
-    assert title.update(102.0, "none", 50.0, "").startswith("history reset")
-    assert title.update(104.0, "none", 50.0, "").startswith("cornell")
+        pace.count(99.0 + frame / 4, 12.0)
+    first = title.update(100.0, "cornell", "svgf + TAA", pace, "")
+    assert first == "cornell · svgf + TAA · 4.0 fps · tracing 12 ms · llvmpipe"
+    assert title.update(100.1, "cornell", "svgf + TAA", pace, "") == ""
+    assert title.update(100.2, "cornell", "none", pace, "history reset").startswith("history reset · cornell · none")
+    assert title.update(102.0, "cornell", "none", pace, "").startswith("history reset")
+    assert title.update(104.0, "cornell", "none", pace, "").startswith("cornell")
+    pace.clear()
+    assert pace.fps == 0.0

@@ -9,30 +9,21 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from tests.window.desktop import F32, SECONDS, App, application, require_tools, running, screen, wait_for
+from tests.window.desktop import (
+    SECONDS,
+    STILL,
+    App,
+    application,
+    difference,
+    plan,
+    require_tools,
+    roughness,
+    running,
+    screen,
+    wait_for,
+)
 
 pytestmark = pytest.mark.window
-
-STILL = 0.004
-"""Mean difference of two filtered pictures of the same view: what noise is left. Measured: 0.0006 to 0.0024."""
-
-
-def roughness(picture: F32) -> float:
-    """Mean difference between a pixel and the mean of its four neighbours: noise is rough, a filtered wall is not."""
-    inner = picture[1:-1, 1:-1]
-    around = picture[:-2, 1:-1] + picture[2:, 1:-1] + picture[1:-1, :-2] + picture[1:-1, 2:]
-    return float(np.abs(inner - around / 4).mean())
-
-
-def difference(one: F32, other: F32) -> float:
-    return float(np.abs(one - other).mean())
-
-
-@pytest.fixture(scope="module")
-def display() -> Iterator[str]:
-    require_tools()
-    with screen() as name:
-        yield name
 
 
 @pytest.fixture(scope="module")
@@ -46,25 +37,14 @@ def app(shared: App) -> Iterator[App]:
     """The window in one and the same condition before each test: 320x180, SVGF, at rest, camera at its beginning."""
     shared.xdotool("windowsize", shared.window, 320, 180)
     shared.press("1", "r", "h")
+    shared.await_passes(plan("svgf"))
     yield shared
     assert shared.process.poll() is None, shared.stderr()
     assert "Traceback" not in shared.stderr()
 
 
-def settled(app: App) -> F32:
-    """The picture once enough frames have gone into it that it no longer changes."""
-    pictures = [app.picture() for _ in range(3)]
-
-    def calm() -> bool:
-        pictures.append(app.picture())
-        return difference(pictures[-4], pictures[-1]) < STILL / 2
-
-    wait_for(calm, "a picture that stands still")
-    return pictures[-1]
-
-
 def test_the_cornell_box_is_on_the_screen(app: App) -> None:
-    picture = settled(app)
+    picture = app.settled()
     assert picture.shape == (90, 160, 3)
     left, right, back = picture[40:50, 42:50], picture[40:50, 110:118], picture[25:35, 75:85]
     assert left[..., 0].mean() > 3 * left[..., 1].mean(), "the left wall is red"
@@ -76,14 +56,16 @@ def test_the_cornell_box_is_on_the_screen(app: App) -> None:
 
 
 def test_zero_shows_the_noise_one_filters_it_and_tab_goes_back(app: App) -> None:
-    filtered = roughness(settled(app))
+    filtered = roughness(app.settled())
     app.press("0")
     app.await_title(" none ")
+    app.await_passes(plan("none"))
     noisy = roughness(app.picture())
     assert noisy > 3 * filtered
     app.press("Tab")
     app.await_title(r" svgf \+ TAA ")
-    assert roughness(settled(app)) < 1.5 * filtered
+    app.await_passes(plan("svgf"))
+    assert roughness(app.settled()) < 1.5 * filtered
     app.press("Tab")
     app.await_title(" none ")
 
@@ -96,61 +78,61 @@ def test_f5_switches_anti_aliasing(app: App) -> None:
 
 
 def test_space_starts_and_stops_what_moves(app: App) -> None:
-    rest = settled(app)
+    rest = app.settled()
     assert difference(rest, app.picture()) < STILL
     app.press("space")
     app.await_title("animation goes on")
     wait_for(lambda: difference(rest, app.picture()) > 2 * STILL, "block and lamp to move")
     app.press("space")
     app.await_title("animation stopped")
-    stopped = settled(app)
-    assert difference(stopped, settled(app)) < STILL
+    stopped = app.settled()
+    assert difference(stopped, app.settled()) < STILL
 
 
 def test_h_forgets_the_history(app: App) -> None:
-    before = settled(app)
+    before = app.settled()
     assert difference(before, app.picture()) < STILL / 2
     assert difference(before, app.picture("h")) > STILL, "noisier with fewer frames in it"
 
 
 def test_w_flies_forward_and_r_goes_back(app: App) -> None:
-    before = settled(app)
+    before = app.settled()
     app.hold("w", 0.7)
-    nearer = settled(app)
+    nearer = app.settled()
     assert difference(before, nearer) > 3 * STILL
     # The box grows from the middle of the picture: what was black beside it is covered now.
     assert (nearer.max(axis=2) > 0.02).mean() > 1.1 * (before.max(axis=2) > 0.02).mean()
     app.press("r")
     app.await_title("camera reset")
-    assert difference(before, settled(app)) < STILL
+    assert difference(before, app.settled()) < STILL
 
 
 def test_taps_shorter_than_a_frame_move_a_little(app: App) -> None:
-    before = settled(app)
+    before = app.settled()
     app.press("d", "d", "d")
-    step = difference(before, settled(app))
+    step = difference(before, app.settled())
     app.hold("d", 0.5)
-    assert STILL < step < difference(before, settled(app)) / 1.5
+    assert STILL < step < difference(before, app.settled()) / 1.5
 
 
 def test_the_right_button_looks_and_escape_lets_go(app: App) -> None:
-    before = settled(app)
+    before = app.settled()
     app.xdotool("mousemove", "--window", app.window, 160, 90)
     app.xdotool("mousemove_relative", 30, 0)
-    assert difference(before, settled(app)) < STILL, "without the button the mouse turns nothing"
+    assert difference(before, app.settled()) < STILL, "without the button the mouse turns nothing"
     app.xdotool("mousedown", 3, "sleep", 0.3, "mousemove_relative", "--", -40, 0, "sleep", 0.3)
-    turned = settled(app)
+    turned = app.settled()
     assert difference(before, turned) > 3 * STILL
     # Looking left, the box moves to the right.
     columns = np.arange(160)
     assert turned.sum(axis=(0, 2)) @ columns / turned.sum() > before.sum(axis=(0, 2)) @ columns / before.sum() + 5
     app.press("Escape")
     app.xdotool("mousemove_relative", 60, 10, "mouseup", 3)
-    assert difference(turned, settled(app)) < STILL, "the mouse is free, the window is open"
+    assert difference(turned, app.settled()) < STILL, "the mouse is free, the window is open"
 
 
 def test_resizing_keeps_the_pictures_shape(app: App) -> None:
-    picture = settled(app)
+    picture = app.settled()
     app.xdotool("windowsize", app.window, 700, 270)
 
     def letterboxed() -> bool:
@@ -164,18 +146,18 @@ def test_resizing_keeps_the_pictures_shape(app: App) -> None:
     for size in ((1280, 800), (1, 1), (40, 500)):
         app.xdotool("windowsize", app.window, *size)
         time.sleep(0.2)
-    assert difference(picture, settled(app)) < STILL, "the picture itself does not depend on the window"
+    assert difference(picture, app.settled()) < STILL, "the picture itself does not depend on the window"
 
 
 def test_a_hidden_window_rests_and_comes_back(app: App) -> None:
-    before = settled(app)
+    before = app.settled()
     app.xdotool("windowunmap", "--sync", app.window)
     time.sleep(0.5)
     start = app.processor_seconds()
     time.sleep(1.0)
     assert app.processor_seconds() - start < 0.15, "neither traces nor spins"
     app.xdotool("windowmap", "--sync", app.window)
-    assert difference(before, settled(app)) < STILL
+    assert difference(before, app.settled()) < STILL
     busy = app.processor_seconds()
     wait_for(lambda: app.processor_seconds() > busy + 0.1, "tracing to go on")
 
@@ -185,7 +167,7 @@ def test_the_flight_goes_on_until_someone_steers_and_escape_quits(display: str, 
         first = app.picture()
         wait_for(lambda: difference(first, app.picture()) > 5 * STILL, "the flight")
         app.press("e")
-        settled(app)
+        app.settled()
         app.press("Escape")
         assert app.process.wait(5.0) == 0
         assert "Traceback" not in app.stderr()
@@ -199,7 +181,7 @@ import config
 from ui import window
 for round in range(2):
     settings = config.load(None, ["render.width=64", "render.height=36"])
-    window.run(settings, "cornell", "svgf", "still", False, Path(sys.argv[1]))
+    window.run(settings, window.Wishes("cornell", "svgf", "still", False, Path(sys.argv[1]), hud=True, calibrate=True))
     print("left:", [thread.name for thread in threading.enumerate()], flush=True)
 """
 

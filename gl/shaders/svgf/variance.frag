@@ -1,4 +1,6 @@
 // Variance in space where the history is too short for one in time. Schied et al. 2017, sec. 4.2.
+//
+// PREFILTER: the colour there is replaced by its mean in space, too.
 
 #include "common/color.glsl"
 #include "common/finite.glsl"
@@ -20,10 +22,14 @@ const float MIN_HISTORY = 4.0;
 #if HAS_IN_MOMENTS
 vec2 moments_at(ivec2 q) { return texelFetch(in_moments, q, 0).xy; }
 float history_at(ivec2 q) { return texelFetch(in_reprojection, q, 0).w + 1.0; }
+vec4 color_at(ivec2 q) { return texelFetch(in_color, q, 0); }
 #else
-vec2 moments_at(ivec2 q) {
+vec4 color_at(ivec2 q) {
     vec3 c = texelFetch(in_color, q, 0).rgb;
-    float l = is_finite(c) ? luminance(clamp_radiance(c)) : 0.0;
+    return is_finite(c) ? vec4(clamp_radiance(c), 0.0) : vec4(0.0);
+}
+vec2 moments_at(ivec2 q) {
+    float l = luminance(color_at(q).rgb);
     return vec2(l, l * l);
 }
 float history_at(ivec2 q) { return 1.0; }
@@ -31,10 +37,7 @@ float history_at(ivec2 q) { return 1.0; }
 
 void main() {
     ivec2 p = ivec2(gl_FragCoord.xy);
-    vec4 color = texelFetch(in_color, p, 0);
-#if !HAS_IN_MOMENTS
-    color = is_finite(color.rgb) ? vec4(clamp_radiance(color.rgb), 0.0) : vec4(0.0);
-#endif
+    vec4 color = color_at(p);
     vec4 surface = texelFetch(in_surface, p, 0);
     float h = history_at(p);
 
@@ -42,6 +45,9 @@ void main() {
     // software rasteriser runs both sides of a branch.
     int last = h < MIN_HISTORY && surface.w > 0.0 ? 48 : -1;
     vec3 sum = vec3(0.0);
+#ifdef PREFILTER
+    vec3 colors = vec3(0.0);
+#endif
     ivec2 size = textureSize(in_color, 0);
     vec2 gradient = texelFetch(in_gradient, p, 0).xy;
     float floor_z = 0.1 * u_pixel_size * surface.w;
@@ -55,12 +61,18 @@ void main() {
         float range = u_sigma_z * abs(dot(gradient, vec2(d))) + floor_z * length(vec2(d)) + 1e-30;
         float w = sane_weight(n * exp(-abs(surface.w - s.w) / range));
         sum += w * vec3(moments_at(q), 1.0);
+#ifdef PREFILTER
+        colors += w * color_at(q).rgb;
+#endif
     }
     if (last >= 0 && sum.z > 0.0) {
         vec2 m = sum.xy / sum.z;
         // Few frames make a poor estimate, and a low one freezes the noise: exaggerate while the history is short.
         float variance = max(m.y - m.x * m.x, 0.0) * MIN_HISTORY / h;
         color.a = min(sqrt(variance), HALF_LIMIT);
+#ifdef PREFILTER
+        color.rgb = colors / sum.z;
+#endif
     }
     out_color = round_to_half(color);
 }

@@ -3,10 +3,10 @@
 #include "common/color.glsl"
 #include "common/finite.glsl"
 
-uniform sampler2D in_color; // tone-mapped, linear
+uniform sampler2D in_color; // tone-mapped, linear; a = 0: none, the radiance was NaN or infinite
 uniform sampler2D in_motion;
 uniform sampler2D in_surface;
-uniform sampler2D prev_color;
+uniform sampler2D prev_color; // as out_color; a = 0: none yet
 uniform bool u_history_valid;
 uniform float u_alpha;
 
@@ -44,8 +44,9 @@ vec3 clip_to_box(vec3 history, vec3 mean, vec3 low, vec3 high) {
 void main() {
     ivec2 p = ivec2(gl_FragCoord.xy);
     size = textureSize(in_color, 0);
-    vec3 c = texelFetch(in_color, p, 0).rgb;
-    out_color = vec4(c, 1.0);
+    vec4 fresh = texelFetch(in_color, p, 0);
+    vec3 c = fresh.rgb;
+    out_color = fresh;
     if (!u_history_valid) return;
 
     // Colour box of the 3x3 neighbourhood in YCoCg.
@@ -71,9 +72,14 @@ void main() {
         }
     }
     vec2 lattice = vec2(p) + texelFetch(in_motion, nearest, 0).xy * vec2(size);
-    bool on_screen = all(greaterThanEqual(lattice, vec2(-0.5))) && all(lessThan(lattice, vec2(size) - 0.5));
-    vec3 history = on_screen ? history_at(lattice) : c;
+    bool known = all(greaterThanEqual(lattice, vec2(-0.5))) && all(lessThan(lattice, vec2(size) - 0.5)) &&
+                 texelFetch(prev_color, ivec2(floor(lattice + 0.5)), 0).a > 0.0;
+    vec3 history = known ? history_at(lattice) : c;
     history = is_finite(history) ? clamp_radiance(history) : c; // the spline rings below zero and above its values
+    if (fresh.a == 0.0) { // black would stay in the history for many frames
+        out_color = round_to_half(vec4(history, known ? 1.0 : 0.0));
+        return;
+    }
 #if CLIP
     history = max(from_ycocg(clip_to_box(to_ycocg(history), mean, low, high)), vec3(0.0));
 #endif

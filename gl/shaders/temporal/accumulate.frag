@@ -1,6 +1,7 @@
 // Blend this frame's sample with the history found by temporal/reproject.frag, and the luminance moments with it.
 //
 // Schied et al. 2017, sec. 4.1 and 4.2: C' = a·C + (1 - a)·C'_prev, moments likewise. HALF: the colour's precision.
+// CLAMPED: the history's colour is first brought within the bounds of temporal/neighbourhood.frag.
 
 #include "common/color.glsl"
 #include "common/finite.glsl"
@@ -9,6 +10,10 @@ uniform sampler2D in_color;
 uniform sampler2D in_reprojection;
 uniform sampler2D prev_color;   // rgb, standard deviation
 uniform sampler2D prev_moments; // first and second luminance moment
+#ifdef CLAMPED
+uniform sampler2D in_low;
+uniform sampler2D in_high;
+#endif
 uniform bool u_history_valid;
 uniform float u_alpha;
 uniform float u_alpha_moments;
@@ -40,7 +45,7 @@ void main() {
     vec2 m = vec2(l, l * l);
 
     vec4 found = texelFetch(in_reprojection, p, 0);
-    int mask = u_history_valid ? int(found.z) : 0;
+    int mask = u_history_valid ? int(max(found.z, 0.0)) : 0; // below 0 it says why there is none
     ivec2 corner = ivec2(floor(found.xy));
     vec2 f = found.xy - vec2(corner);
     if ((mask & 15) != 0) {
@@ -57,6 +62,9 @@ void main() {
     if (total > 0.0) {
         color /= total;
         moments /= total;
+#ifdef CLAMPED
+        color = clamp(color, texelFetch(in_low, p, 0).rgb, texelFetch(in_high, p, 0).rgb);
+#endif
         // A plain running mean until the new sample's share has fallen to alpha, exponential from then on.
         float share = 1.0 / (found.w + 1.0);
         c = usable ? mix(color, c, max(share, u_alpha)) : color;

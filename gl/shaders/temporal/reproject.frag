@@ -24,11 +24,22 @@ layout(location = 1) out vec4 out_guide;
 const float MIN_COSINE = 0.05;
 const float COSINE_SCALE = 0.984375; // length and cosine share a channel: integer part and fraction
 
+// Why a pixel has no history, as gl/passes/temporal.py explains to people (REJECTIONS). From OTHER_OBJECT on in the
+// order of the tests that a texel must pass.
+const float NO_HISTORY = -1.0;
+const float NO_SURFACE = -2.0;
+const float OUT_OF_VIEW = -3.0;
+const float OTHER_OBJECT = -4.0;
+const float OTHER_DEPTH = -5.0;
+const float OTHER_NORMAL = -6.0;
+const float TOO_SHORT = -7.0;
+
 ivec2 size;
 vec4 motion;
 vec3 normal;
 vec2 gradient;
 vec2 lattice; // position in the last frame, in texels whose centres are integers
+float reason; // of the texel that passed most tests
 
 // History length of a texel of the last frame if it saw this surface, otherwise 0; y: cosine of its view angle.
 vec2 test(ivec2 tap) {
@@ -37,9 +48,12 @@ vec2 test(ivec2 tap) {
     // The slope is this frame's: the surface has hardly turned since, and a pixel of slack covers what it has.
     float expected = motion.z + dot(gradient, vec2(tap) - lattice);
     float limit = u_depth_tolerance * motion.z + abs(gradient.x) + abs(gradient.y);
-    bool same = abs(guide.z - motion.w) < 0.5 && abs(guide.y - expected) <= limit &&
-                dot(decode_normal(guide.x), normal) >= u_normal_tolerance;
-    return same ? vec2(floor(guide.w), fract(guide.w)) : vec2(0.0);
+    bool object = abs(guide.z - motion.w) < 0.5;
+    bool depth = abs(guide.y - expected) <= limit;
+    bool facing = dot(decode_normal(guide.x), normal) >= u_normal_tolerance;
+    float verdict = !object ? OTHER_OBJECT : !depth ? OTHER_DEPTH : !facing ? OTHER_NORMAL : TOO_SHORT;
+    reason = min(reason, verdict);
+    return verdict == TOO_SHORT ? vec2(floor(guide.w), fract(guide.w)) : vec2(0.0);
 }
 
 void main() {
@@ -59,9 +73,10 @@ void main() {
 
     lattice = vec2(p) + motion.xy * vec2(size);
     float mask = 0.0, history = 0.0;
-    bool seen = u_history_valid && is_finite(motion) && is_finite(vec4(surface)) && motion.w >= 0.0 && motion.z > 0.0 &&
-                all(greaterThan(lattice, vec2(-1.5))) && all(lessThan(lattice, vec2(size) + 0.5));
-    if (seen) {
+    bool hit = is_finite(motion) && is_finite(vec4(surface)) && motion.w >= 0.0;
+    bool in_view = motion.z > 0.0 && all(greaterThan(lattice, vec2(-1.5))) && all(lessThan(lattice, vec2(size) + 0.5));
+    reason = !u_history_valid ? NO_HISTORY : !hit ? NO_SURFACE : OUT_OF_VIEW;
+    if (u_history_valid && hit && in_view) {
         // 2x2 bilinear taps; those that fail are dropped and the weights renormalised.
         ivec2 corner = ivec2(floor(lattice));
         vec2 f = lattice - vec2(corner);
@@ -104,6 +119,6 @@ void main() {
         if (history < 1.0) mask = 0.0;
     }
     history = mask > 0.0 ? history : 0.0;
-    out_reprojection = vec4(lattice, mask, history);
+    out_reprojection = vec4(lattice, mask > 0.0 ? mask : reason, history);
     out_guide = vec4(encode_normal(surface.xyz), surface.w, motion.w, history + 1.0 + COSINE_SCALE * cosine);
 }

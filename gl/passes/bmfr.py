@@ -1,0 +1,240 @@
+"""BMFR. Koskela et al. 2019, "Blockwise Multi-Order Feature Regression for Real-Time Path-Tracing Reconstruction".
+
+Accumulate the noisy frames, fit each block of the result by a linear combination of noise-free features, accumulate the
+fits. The features are data (``bmfr.features``); the shader is compiled for them.
+
+Deviations from the paper:
+
+* The least squares are solved by Givens rotations, a triangle for each invocation and a tree of merges
+  (``bmfr/solver.glsl``), not by Householder reflections: the same triangle with a handful of barriers.
+* Positions are taken relative to the camera, brought to [-1, 1] in every block whatever its size, and squared after
+  that. Far from the origin of the world their squares would be linear, and in small blocks the noise would drown them.
+* A surface point is compared with where it was in the last frame, so that what moves keeps its history; the limit is
+  given in widths of a pixel, so that it suits every scene.
+* Where the sky is seen, and where there is no finite sample, a pixel takes no part in the fit.
+* A rank test can take the place of the noise, or go along with it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+from config import Bmfr
+from gl.graph import ComputePass, FragmentPass, Graph, In, Out, Prev, Tex, Uniform
+from gl.passes.temporal import Guides
+from raytrace.frame import Basis, Vector
+
+REPROJECTION = "xy: position in the last frame, texel units; z: mask of the 2x2 valid taps; w: history length N, frames"
+SAMPLES = "rgb: accumulated irradiance; a: frames in it, 0 where there is none"
+
+COMPONENTS: Final = {"1": 1, "n": 3, "w": 3, "w2": 3, "w3": 3, "albedo": 3, "depth": 1}
+"""Numbers that each feature contributes to a row."""
+
+OFFSETS: Final = (
+    *((-14, -14), (4, -6), (-8, 14), (8, 0), (-10, -8), (2, 12), (12, -12), (-10, 0)),
+    *((12, 14), (-8, -16), (6, 6), (-2, -2), (6, -14), (-16, 12), (14, -4), (-6, 4)),
+)
+"""Where the grid of blocks of 32 pixels begins in 16 successive frames, in pixels: the cycle of the authors' code."""
+
+SOFTWARE_THREADS: Final = 8
+"""Invocations per block on a renderer that runs on the CPU: as many as a vector register holds, since each barrier is
+a switch of the whole group."""
+
+HARDWARE_THREADS: Final = 64
+"""Invocations per block on a GPU, where fewer would leave its units idle."""
+
+SHARED_MEMORY: Final = 32768
+"""Bytes that a work group may share: what OpenGL 4.3 guarantees. moderngl does not tell how much more there is."""
+
+
+@dataclass(frozen=True)
+class View:
+    """What a frame's camera and its renderer tell the filter besides textures.
+
+    ``basis``, ``jitter``, ``pixel_size``, ``index``: as in the :class:`FramePacket`. ``threads``: invocations that work
+    on a block.
+    """
+
+    basis: Basis
+    jitter: tuple[float, float]
+    pixel_size: float
+    index: int
+    threads: int
+
+    @property
+    def rows(self) -> tuple[Vector, ...]:
+        """Rows of the matrix that makes (x, y, 1), pixels from the image's centre, a ray of depth 1 in world space."""
+        right, up, forward = self.basis
+        return tuple((self.pixel_size * x, self.pixel_size * y, z) for x, y, z in zip(right, up, forward, strict=True))
+
+
+class Accumulate(FragmentPass):
+    """Find each surface point in the last frame by position and normal, and blend its sample with the history there.
+
+    Of the 2x2 texels around it those count that are near enough (sec. 3.1); there is no search farther away.
+    """
+
+    shader = "bmfr/accumulate.frag"
+    in_direct = In("irradiance")
+    in_indirect = In("irradiance")
+    in_motion = In("xy: previous uv - uv; z: expected previous depth, scene units; w: object id, -1 = miss")
+    in_surface = In("xyz: shading normal, world; w: depth, scene units")
+    in_prev_normal = In(
+        "xyz: the point's normal in the last frame, world; scenes in which something moves", optional=True
+    )
+    prev_color = Prev(SAMPLES)
+    prev_guide = Prev("x: normal, octahedral; y: depth, scene units")
+    out_color = Out("rgba16f", SAMPLES)
+    out_reprojection = Out("rgba32f", REPROJECTION)
+    out_guide = Out("rg32f", "x: normal, octahedral; y: depth, scene units")
+    u_view = Uniform("mat3", "from pixels off the centre at depth 1, and depth, to world space")
+    u_pixel_size = Uniform("float", "> 0, scene units a pixel is wide at depth 1")
+    u_alpha = Uniform("float", "[0;1] smallest weight of the new sample")
+    u_max_history = Uniform("float", "[1;255] frames, the longest history that is counted")
+    u_position_tolerance = Uniform("float", "> 0, widths of a pixel on the surface")
+    u_normal_tolerance = Uniform("float", "[0;4] squared distance of the normals")
+
+
+class Fit(ComputePass):
+    """Replace each block by the least-squares combination of its features (sec. 3.2 and 3.3).
+
+    A work group takes a block; the grid is shifted from frame to frame, so there is one block more on each axis.
+    """
+
+    shader = "bmfr/fit.comp"
+    in_color = In(SAMPLES)
+    in_surface = In("xyz: shading normal, world; w: depth, scene units")
+    in_albedo = In("the surface's albedo, if it is a feature", optional=True)
+    out_color = Out("rgba16f", "rgb: fitted irradiance, not negative; 0 on misses")
+    u_view = Uniform("mat3", "from pixels off the centre at depth 1, and depth, to world space")
+    u_jitter = Uniform("vec2", "[-0.5;0.5] where in their pixels the camera rays pass, from the centre")
+    u_offset = Uniform("ivec2", "pixels that the grid is shifted by, at most half a block")
+    u_seed = Uniform("uint", "of the noise, another one for each frame")
+    u_noise = Uniform("float", "[0;1] largest noise added to a feature")
+    u_rank_tolerance = Uniform("float", "> 0, what of a feature is neglected, root of the mean square over the block")
+
+    def __init__(self, p: Bmfr, view: View) -> None:
+        shift = OFFSETS[view.index % len(OFFSETS)]
+        super().__init__(
+            group=(p.block, p.block),
+            defines={
+                **layout(p.features),
+                "THREADS": view.threads,
+                "NOISE": int(p.regularization != "rank"),
+                "UNIT": int(p.unit_scale),
+            },
+            u_view=view.rows,
+            u_jitter=view.jitter,
+            u_offset=tuple(pixels * p.block // 32 for pixels in shift),
+            u_seed=view.index,
+            u_noise=p.noise,
+            u_rank_tolerance=1e-7 if p.regularization == "noise" else p.rank_tolerance,
+        )
+
+    def work_groups(self, size: tuple[int, int]) -> tuple[int, int]:
+        """One more than the blocks of an unshifted grid, in x and in y."""
+        x, y = super().work_groups(size)
+        return x + 1, y + 1
+
+
+class AccumulateFit(FragmentPass):
+    """Blend the fit with those before, by the decisions of :class:`Accumulate` (sec. 3.4)."""
+
+    shader = "bmfr/accumulate_fit.frag"
+    in_color = In("rgb: fitted irradiance")
+    in_reprojection = In(REPROJECTION)
+    prev_color = Prev("rgb: what this pass wrote in the last frame")
+    out_color = Out("rgba16f", "rgb: accumulated fitted irradiance")
+    u_alpha = Uniform("float", "[0;1] smallest weight of the new fit")
+
+
+class Restore(FragmentPass):
+    """Add to the fit what of the samples' mean difference to it is no noise."""
+
+    shader = "bmfr/restore.frag"
+    in_color = In("rgb: accumulated fitted irradiance")
+    in_direct = In("irradiance")
+    in_indirect = In("irradiance")
+    in_reprojection = In(REPROJECTION)
+    prev_residual = Prev("rgb: mean difference of samples and fit; a: root of the mean square of its luminance")
+    out_color = Out("rgba16f", "rgb: irradiance")
+    out_residual = Out("rgba16f", "rgb: mean difference of samples and fit; a: root of the mean square of its luminance")
+    u_alpha = Uniform("float", "[0;1] smallest weight of the new difference")
+    u_deviations = Uniform("float", "> 0, standard deviations of the mean that count as noise")
+
+
+def layout(features: str) -> dict[str, int]:
+    """``FEATURES``, the length of a row, and for each feature ``X_AT``, its place there; -1 for what is not listed."""
+    places = {f"{name.upper()}_AT": -1 for name in COMPONENTS if name != "1"}
+    length = 0
+    for name in features.split(","):
+        if name != "1":
+            places[f"{name.upper()}_AT"] = length
+        length += COMPONENTS[name]
+    return {"FEATURES": length, **places}
+
+
+def thread_count(features: str, software: bool) -> int:
+    """Invocations per block: what suits the renderer, halved until their triangles fit into shared memory."""
+    count = layout(features)["FEATURES"]
+    threads = SOFTWARE_THREADS if software else HARDWARE_THREADS
+    while threads > 1 and shared_bytes(count, threads) > SHARED_MEMORY:
+        threads //= 2
+    return threads
+
+
+def shared_bytes(features: int, threads: int) -> int:
+    """Shared memory of ``bmfr/fit.comp``: half of the triangles, the bounds of position, the weights."""
+    triangles = features * (features + 7) // 2 * max(threads // 2, 1)
+    return 4 * triangles + 2 * 16 * threads + 16 * features
+
+
+def bmfr(g: Graph, direct: Tex, indirect: Tex, albedo: Tex, guides: Guides, p: Bmfr, view: View) -> Tex:
+    """Filter the sum of ``direct`` and ``indirect`` (noisy irradiance); returns the clean one."""
+    with g.scope("bmfr"):
+        noisy, guide = g.history("bmfr.noisy", "rgba16f"), g.history("bmfr.guide", "rg32f")
+        samples = g.add(
+            Accumulate(
+                u_view=view.rows,
+                u_pixel_size=view.pixel_size,
+                u_alpha=p.alpha,
+                u_max_history=float(p.max_history),
+                u_position_tolerance=p.position_tolerance,
+                u_normal_tolerance=p.normal_tolerance,
+                defines={"ROUND_HISTORY": int(p.round_history)},
+            ),
+            in_direct=direct,
+            in_indirect=indirect,
+            in_motion=guides.motion,
+            in_surface=guides.surface,
+            prev_color=noisy,
+            prev_guide=guide,
+            **guides.optional,
+        )
+        g.feed(noisy, samples.out_color)
+        g.feed(guide, samples.out_guide)
+        features = {"in_albedo": albedo} if "albedo" in p.features.split(",") else {}
+        fit = g.add(Fit(p, view), in_color=samples.out_color, in_surface=guides.surface, **features).out_color
+        fitted = g.history("bmfr.fitted", "rgba16f")
+        clean = g.add(
+            AccumulateFit(u_alpha=p.alpha_fit),
+            in_color=fit,
+            in_reprojection=samples.out_reprojection,
+            prev_color=fitted,
+        ).out_color
+        g.feed(fitted, clean)
+        import os
+        if "RESTORE" not in os.environ: return clean
+        a,d=map(float,os.environ["RESTORE"].split(","))
+        residual = g.history("bmfr.residual", "rgba16f")
+        restored = g.add(
+            Restore(u_alpha=a, u_deviations=d),
+            in_color=clean,
+            in_direct=direct,
+            in_indirect=indirect,
+            in_reprojection=samples.out_reprojection,
+            prev_residual=residual,
+        )
+        g.feed(residual, restored.out_residual)
+        return restored.out_color

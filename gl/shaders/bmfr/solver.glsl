@@ -1,0 +1,129 @@
+// Linear least squares by Givens rotations, for FEATURES features and the three channels of a colour.
+//
+// Every invocation folds rows (features, colour) into an upper triangle of its own; the group's triangles are then merged
+// through shared memory, and one invocation solves. Nothing but the triangle is kept: Koskela et al. 2019, sec. 3.3,
+// leave out Q in the same way. A rotation cannot cancel, so no sign has to be chosen as for Householder reflections.
+//
+// The triangle must stay in registers. Compilers see to that only where every index is constant, and they do not unroll
+// a loop of this size by themselves: hence EACH. FEATURES is at most 18, THREADS a power of two.
+
+const int COLUMNS = FEATURES + 3;
+const int ENTRIES = FEATURES * (FEATURES + 7) / 2;
+const int LANES = max(THREADS / 2, 1);
+
+#define EACH_1(F) F(0)
+#define EACH_2(F) EACH_1(F) F(1)
+#define EACH_3(F) EACH_2(F) F(2)
+#define EACH_4(F) EACH_3(F) F(3)
+#define EACH_5(F) EACH_4(F) F(4)
+#define EACH_6(F) EACH_5(F) F(5)
+#define EACH_7(F) EACH_6(F) F(6)
+#define EACH_8(F) EACH_7(F) F(7)
+#define EACH_9(F) EACH_8(F) F(8)
+#define EACH_10(F) EACH_9(F) F(9)
+#define EACH_11(F) EACH_10(F) F(10)
+#define EACH_12(F) EACH_11(F) F(11)
+#define EACH_13(F) EACH_12(F) F(12)
+#define EACH_14(F) EACH_13(F) F(13)
+#define EACH_15(F) EACH_14(F) F(14)
+#define EACH_16(F) EACH_15(F) F(15)
+#define EACH_17(F) EACH_16(F) F(16)
+#define EACH_18(F) EACH_17(F) F(17)
+#define EACH_(N) EACH_##N
+#define EACH_OF(N) EACH_(N)
+#define EACH(F) EACH_OF(FEATURES)(F) // F(0) F(1) ... F(FEATURES - 1)
+
+// Row k of the triangle from its diagonal to the colours, rows one after the other.
+int entry(int k, int j) { return k * COLUMNS - k * (k - 1) / 2 + j - k; }
+
+float triangle[ENTRIES];
+float row[COLUMNS];
+
+shared float s_triangle[ENTRIES * LANES];
+shared vec3 s_weights[FEATURES];
+
+void clear_row(const int k) {
+    for (int j = k; j < COLUMNS; ++j) triangle[entry(k, j)] = 0.0;
+}
+
+#define CLEAR(k) clear_row(k);
+void clear_triangle() { EACH(CLEAR) }
+
+// Turn `row` against row k of the triangle so that its element k becomes 0.
+void rotate(const int k) {
+    float a = triangle[entry(k, k)], b = row[k];
+    float square = a * a + b * b;
+    // Features are of the order of 1. Where both are 0 the row passes on as it is, and row k is left for another one.
+    bool turn = square > 1e-20;
+    float inverse = turn ? inversesqrt(square) : 0.0;
+    float c = turn ? a * inverse : 1.0, s = b * inverse;
+    triangle[entry(k, k)] = square * inverse;
+    for (int j = k + 1; j < COLUMNS; ++j) {
+        float t = triangle[entry(k, j)];
+        triangle[entry(k, j)] = c * t + s * row[j];
+        row[j] = c * row[j] - s * t;
+    }
+}
+
+#define ROTATE(k) rotate(k);
+void fold_row() { EACH(ROTATE) }
+
+void share_row(const int k, int lane) {
+    for (int j = k; j < COLUMNS; ++j) s_triangle[entry(k, j) * LANES + lane] = triangle[entry(k, j)];
+}
+
+#define SHARE(k) share_row(k, lane);
+void share_triangle(int lane) { EACH(SHARE) }
+
+// The triangle of all rows of the group, in shared memory at lane 0. To be called by the whole group.
+void merge_triangles(int thread) {
+    for (int count = THREADS / 2; count > 0; count /= 2) {
+        barrier();
+        if (thread >= count && thread < 2 * count) share_triangle(thread - count);
+        barrier();
+        int last = thread < count ? FEATURES : 0;
+        for (int k = 0; k < last; ++k) {
+            for (int j = 0; j < COLUMNS; ++j) row[j] = j < k ? 0.0 : s_triangle[entry(k, j) * LANES + thread];
+            fold_row();
+        }
+    }
+    if (thread == 0) share_triangle(0);
+}
+
+float shared_entry(int k, int j) { return s_triangle[entry(k, j) * LANES]; }
+
+// Take column k out of the triangle at lane 0: what is left of its row belongs to the rows below.
+void drop_column(int k) {
+    for (int i = k + 1; i < FEATURES; ++i) {
+        float a = shared_entry(i, i), b = shared_entry(k, i);
+        float square = a * a + b * b;
+        if (square <= 1e-20) continue;
+        float inverse = inversesqrt(square), c = a * inverse, s = b * inverse;
+        for (int j = i; j < COLUMNS; ++j) {
+            float upper = shared_entry(i, j), lower = shared_entry(k, j);
+            s_triangle[entry(i, j) * LANES] = c * upper + s * lower;
+            s_triangle[entry(k, j) * LANES] = c * lower - s * upper;
+        }
+    }
+}
+
+// Weights of the features in s_weights, by one invocation after merge_triangles(). Feature 0 is the constant, whose length
+// is the root of the number of rows. A feature of which no more than `tolerance` per row, root of the mean square, cannot
+// be had from those before it gets no weight, and the others the least squares without it.
+void solve(float tolerance) {
+    float tiny = tolerance * shared_entry(0, 0);
+    for (int k = 0; k < FEATURES; ++k) {
+        // A loop of one turn or none, not a branch: a software rasteriser runs both sides of that.
+        int end = shared_entry(k, k) > tiny ? k : k + 1;
+        for (int i = k; i < end; ++i) {
+            drop_column(i);
+            s_triangle[entry(i, i) * LANES] = 0.0;
+        }
+    }
+    for (int k = FEATURES - 1; k >= 0; --k) {
+        vec3 rest = vec3(shared_entry(k, FEATURES), shared_entry(k, FEATURES + 1), shared_entry(k, FEATURES + 2));
+        for (int j = k + 1; j < FEATURES; ++j) rest -= shared_entry(k, j) * s_weights[j];
+        float diagonal = shared_entry(k, k);
+        s_weights[k] = diagonal > 0.0 ? rest / diagonal : vec3(0.0);
+    }
+}

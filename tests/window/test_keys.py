@@ -1,0 +1,320 @@
+"""Every key of the key table, pressed by xdotool in the real window: what it changes is seen in the picture, on the
+screen, or in the passes that the frame runs through.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+
+from tests.window.desktop import F32, STILL, App, application, difference, plan, roughness, wait_for
+from ui.keys import BINDINGS, Binding
+
+pytestmark = pytest.mark.window
+
+WINDOW = 640, 360
+
+
+@pytest.fixture(scope="module")
+def shared(display: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[App]:
+    with application(display, tmp_path_factory.mktemp("keys"), "--no-animate") as app:
+        app.xdotool("windowsize", app.window, *WINDOW)
+        yield app
+
+
+@pytest.fixture
+def app(shared: App) -> Iterator[App]:
+    """SVGF at rest, the camera at its beginning, everything as the program starts; to be left like that."""
+    shared.press("1", "r", "h")
+    shared.await_passes(plan("svgf"))
+    yield shared
+    assert shared.process.poll() is None, shared.stderr()
+    assert shared.stderr() == ""
+
+
+def on_screen(app: App) -> F32:
+    """The window's part of the screen, (H, W, 3), row 0 on top."""
+    return app.screen()[: WINDOW[1], : WINDOW[0]]
+
+
+def method(key: str, denoiser: str) -> Callable[[App], None]:
+    """``key`` shows ``denoiser``, from whichever other one."""
+
+    def check(app: App) -> None:
+        app.press("0" if denoiser == "svgf" else "1")
+        app.await_title(f" {'none' if denoiser == 'svgf' else 'svgf'} ")
+        app.press(key)
+        app.await_title(f" {denoiser} ")
+        app.await_passes(plan(denoiser))
+        noisy = roughness(app.settled() if denoiser != "none" else app.picture())
+        assert (noisy > 0.02) == (denoiser == "none")
+
+    return check
+
+
+def stage(key: str, *states: str, last: str = "") -> Callable[[App], None]:
+    """Each press of ``key`` brings the next of ``states``, settings as ``--set`` takes them, and its passes.
+
+    ``last``: another key that takes the change back; otherwise ``states`` go round.
+    """
+
+    def check(app: App) -> None:
+        for setting in states:
+            name, _, value = setting.partition("=")
+            app.ask(key, f": {name} = {value}$")
+            app.await_passes(plan("svgf", setting))
+        if last:
+            app.ask(last, " = ")
+            app.await_passes(plan("svgf"))
+
+    assert any(plan("svgf", setting) != plan("svgf") for setting in states), "passes cannot tell these settings"
+    return check
+
+
+def previous(app: App) -> None:
+    app.press("0")
+    app.await_passes(plan("none"))
+    app.press("Tab")
+    app.await_passes(plan("svgf"))
+    app.press("Tab")
+    app.await_passes(plan("none"))
+    assert roughness(app.picture()) > 0.02
+
+
+def jitter(app: App) -> None:
+    """What stands still is at other places of the pixels in every frame, or not: seen in the tracer's albedo."""
+
+    def images() -> list[F32]:
+        found = []
+        for _ in range(4):
+            app.ask("h", "history reset")  # another frame than the one before
+            found.append(on_screen(app))
+        return found
+
+    for _ in range(20):
+        if "albedo" in app.ask("b", r"^frame \d+: (.*)$")[1]:
+            break
+    lively = images()
+    assert max(difference(lively[0], image) for image in lively[1:]) > 1e-4
+    app.ask("F6", "render.jitter = off")
+    calm = images()
+    assert max(difference(calm[0], image) for image in calm[1:]) < 1e-5
+    app.ask("F6", "render.jitter = on")
+    app.press("0")  # has other textures: the picture is shown again
+    app.await_passes(plan("none"))
+
+
+def tone_curve(app: App) -> None:
+    brightness = {}
+    for name in ("none", "reinhard", "aces"):
+        app.ask("F9", f"display.tonemap = {name}")
+        brightness[name] = float(app.settled().mean())
+    assert len({round(value, 2) for value in brightness.values()}) == 3
+
+
+def exposure(key: str, back: str, sign: int) -> Callable[[App], None]:
+    def check(app: App) -> None:
+        before = app.settled().mean()
+        app.ask(key, f"display.exposure = {0.5 * sign}$")
+        assert sign * (app.settled().mean() - before) > 5 * STILL
+        app.ask(back, r"display.exposure = 0.0")
+        assert abs(app.settled().mean() - before) < STILL
+
+    return check
+
+
+def animation(app: App) -> None:
+    rest = app.settled()
+    app.ask("space", "animation goes on")
+    wait_for(lambda: difference(rest, app.picture()) > 2 * STILL, "block and lamp to move")
+    app.ask("space", "animation stopped")
+    stopped = app.settled()
+    assert difference(stopped, app.settled()) < STILL
+
+
+def single_step(app: App) -> None:
+    before = app.settled()
+    for _ in range(12):
+        app.ask("period", "one step of the animation")
+    after = app.settled()
+    assert difference(before, after) > 1.5 * STILL
+    assert difference(after, app.settled()) < STILL, "it stops there"
+
+
+def next_scene(app: App) -> None:
+    frames = app.ask("n", r"^frame (\d+): ")
+    app.hear("opened interior", frames.end(), 120.0)
+    app.ask("n", "opened cornell")
+    app.await_title(r"· cornell · svgf")
+
+
+def camera_home(app: App) -> None:
+    before = app.settled()
+    app.hold("d", 0.3)
+    assert difference(before, app.settled()) > 2 * STILL
+    app.ask("r", "camera reset")
+    assert difference(before, app.settled()) < STILL
+
+
+def history(app: App) -> None:
+    before = app.settled()
+    assert difference(before, app.picture()) < STILL / 2
+    assert difference(before, app.picture("h")) > STILL, "noisier with fewer frames in it"
+
+
+def texture(key: str, back: str) -> Callable[[App], None]:
+    def check(app: App) -> None:
+        app.settled()
+        before = on_screen(app)
+        name = app.ask(key, r"^frame \d+: (\w+\.[\w.]+)$")[1]
+        wait_for(lambda: difference(before, on_screen(app)) > 10 * STILL, f"{name} on the screen")
+        app.ask(back, "the picture")
+        wait_for(lambda: difference(before, on_screen(app)) < 2 * STILL, "the picture on the screen")
+
+    return check
+
+
+def split(app: App) -> None:
+    app.xdotool("mousemove", "--window", app.window, WINDOW[0] // 2, 20)
+    smooth = roughness(app.settled())
+    app.ask("x", "split on")
+
+    def halves() -> bool:
+        left, right = np.split(on_screen(app)[::4, ::4], 2, axis=1)
+        return roughness(left) > 3 * smooth and roughness(right[:, 2:]) < 2 * smooth
+
+    wait_for(halves, "noise to the left of the mouse only")
+    app.ask("x", "split off")
+    wait_for(lambda: roughness(on_screen(app)[::4, ::4]) < 2 * smooth, "no noise at all")
+
+
+def overlay(key: str, name: str) -> Callable[[App], None]:
+    """``key`` draws text over the picture, and takes it away."""
+
+    def check(app: App) -> None:
+        app.xdotool("mousemove", "--window", app.window, 200, 100)
+        app.settled()
+        before = on_screen(app)
+        app.ask(key, f"{name} on")
+        wait_for(lambda: difference(before, on_screen(app)) > 3 * STILL, f"{name} over the picture")
+        app.ask(key, f"{name} off")
+        wait_for(lambda: difference(before, on_screen(app)) < STILL, "the picture alone")
+
+    return check
+
+
+def resolution(key: str, back: str, size: tuple[int, int]) -> Callable[[App], None]:
+    def check(app: App) -> None:
+        app.ask(key, f"^frame \\d+: {size[0]}x{size[1]}, ")
+        app.await_title(f"{size[0]}x{size[1]} pixels")
+        assert app.picture().shape == (size[1], size[0], 3)
+        app.ask(back, r"^frame \d+: 160x90, ")
+        assert app.picture().shape == (90, 160, 3)
+
+    return check
+
+
+def screenshot(app: App) -> None:
+    name = app.ask("F12", r"^frame \d+: saved (.*shot_\d+\.png)$")[1]
+    assert name in {str(path) for path in app.folder.glob("out/shot_*.png")}
+    assert f"\n{name}\n" in app.stdout()
+
+
+def let_go(app: App) -> None:
+    """While the mouse turns the camera; a later test has the other meaning of Escape."""
+    app.xdotool("mousemove", "--window", app.window, 320, 100, "mousedown", 3, "sleep", 0.3)
+    app.press("Escape")
+    before = app.settled()
+    app.xdotool("mousemove_relative", 60, 10, "mouseup", 3)
+    assert difference(before, app.settled()) < STILL
+
+
+def place(picture: F32) -> tuple[float, float, float]:
+    """Where the light of a picture is: mean column, mean row from the top, and how far from there on the average."""
+    light = picture.sum(axis=2, dtype=np.float64)
+    rows, columns = np.indices(light.shape)
+    x, y = ((light * at).sum() / light.sum() for at in (columns, rows))
+    return x, y, float((light * np.hypot(columns - x, rows - y)).sum() / light.sum())
+
+
+def flight(key: str, moved: int, sign: int) -> Callable[[App], None]:
+    """While ``key`` is held, component ``moved`` of :func:`place` grows or, with ``sign`` -1, shrinks."""
+
+    def check(app: App) -> None:
+        before = place(app.settled())[moved]
+        app.hold(key, 0.4)
+        assert sign * (place(app.settled())[moved] - before) > 2.0
+
+    return check
+
+
+def fast(app: App) -> None:
+    start = place(app.settled())[0]
+    app.hold("d", 0.15)
+    slow = start - place(app.settled())[0]
+    app.ask("r", "camera reset")
+    app.xdotool("windowfocus", app.window, "keydown", "Shift_L", "keydown", "d", "sleep", 0.15, "keyup", "d")
+    app.xdotool("keyup", "Shift_L")
+    assert start - place(app.settled())[0] > 1.5 * slow > 0.0
+
+
+CHECKS: dict[str, Callable[[App], None]] = {
+    "0": method("0", "none"),
+    "1": method("1", "svgf"),
+    "2": method("2", "bmfr"),
+    "TAB": previous,
+    "P": stage("p", "svgf.preset=paper", "svgf.preset=reference", "svgf.preset=best"),
+    "F1": stage("F1", "svgf.temporal=false", "svgf.temporal=true"),
+    "F2": stage("F2", "svgf.variance_guided=false", "svgf.variance_guided=true"),
+    "F3": stage("F3", "svgf.iterations=0", "svgf.iterations=5"),
+    "LEFT": stage("Left", "svgf.iterations=4", last="Right"),
+    "RIGHT": stage("Right", "svgf.iterations=6", last="Left"),
+    "F4": stage("F4", "svgf.demodulate=false", "svgf.demodulate=true"),
+    "F5": stage("F5", "taa.enabled=false", "taa.enabled=true"),
+    "F6": jitter,
+    "F7": stage("F7", "firefly.mode=clamp", "firefly.mode=variance", "firefly.mode=off"),
+    "F8": stage("F8", "svgf.separate=false", "svgf.separate=true"),
+    "F9": tone_curve,
+    "UP": exposure("Up", "Down", +1),
+    "DOWN": exposure("Down", "Up", -1),
+    "L": stage("l", "display.auto_exposure=true", "display.auto_exposure=false"),
+    "SPACE": animation,
+    "PERIOD": single_step,
+    "N": next_scene,
+    "R": camera_home,
+    "H": history,
+    "B": texture("b", "v"),
+    "V": texture("v", "b"),
+    "X": split,
+    "I": overlay("i", "inspect"),
+    "EQUAL": resolution("equal", "minus", (213, 120)),
+    "MINUS": resolution("minus", "equal", (120, 68)),
+    "G": overlay("g", "hud"),
+    "K": overlay("k", "help"),
+    "F12": screenshot,
+    "ESCAPE": let_go,
+    "W": flight("w", moved=2, sign=1),
+    "S": flight("s", moved=2, sign=-1),
+    "A": flight("a", moved=0, sign=1),
+    "D": flight("d", moved=0, sign=-1),
+    "Q": flight("q", moved=1, sign=-1),
+    "E": flight("e", moved=1, sign=1),
+    "SHIFT": fast,
+}
+
+
+@pytest.mark.parametrize("binding", BINDINGS, ids=lambda binding: binding.key)
+def test_every_key_does_what_the_table_says(app: App, binding: Binding) -> None:
+    assert binding.key in CHECKS, "a key that nobody has tried"
+    CHECKS[binding.key](app)
+
+
+def test_every_check_is_of_a_key_there_is() -> None:
+    assert list(CHECKS) == [binding.key for binding in BINDINGS]
+
+
+def test_escape_quits(app: App) -> None:
+    app.press("Escape")
+    assert app.process.wait(10.0) == 0
