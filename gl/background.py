@@ -33,8 +33,8 @@ TAKE_OVER: Final = 0.025
 """Seconds per call of :meth:`Compiler.ready` after which it takes nothing more over."""
 
 SETTLED: Final = 0.5
-"""Seconds after which something compiled in the background is taken over: drivers write their cache behind the scenes.
-Mesa's, asked at once on a busy machine, held nine of twelve variants."""
+"""Seconds after which something compiled in the background is taken over, or as long as that has taken if it is longer:
+drivers write their cache behind the scenes. Mesa's, asked at once on a busy machine, held nine of twelve variants."""
 
 LOOK_EVERY: Final = 0.3
 """Seconds between two looks at the shader files."""
@@ -207,24 +207,29 @@ class _Background:
             self._news.wait_for(lambda: self._closing or self._reload is not None or self._wanted)
             if self._closing:
                 return False
+            start = time.monotonic()
             reload = self._reload
             if reload is None:
                 key, node = next(iter(self._wanted.items()))
                 size = self._size
         if reload is not None:
-            self._obey_reload(ctx, executor, *reload)
+            self._obey_reload(ctx, executor, *reload, start)
         else:
             self._prepare(ctx, executor, node, size)
             with self._news:
-                self._finish({key: node})
+                self._finish({key: node}, start)
                 self._wanted.pop(key, None)
         return True
 
-    def _finish(self, made: Wanted) -> None:
+    def _finish(self, made: Wanted, start: float) -> float:
+        """Note what was made since ``start``, and return when it can be taken over."""
+        now = time.monotonic()
+        settled_at = now + max(SETTLED, now - start)
         self._finished |= made
-        self._settled_at |= dict.fromkeys(made, time.monotonic() + SETTLED)
+        self._settled_at |= dict.fromkeys(made, settled_at)
+        return settled_at
 
-    def _obey_reload(self, ctx: moderngl.Context, executor: Executor, again: Wanted, size: Size) -> None:
+    def _obey_reload(self, ctx: moderngl.Context, executor: Executor, again: Wanted, size: Size, start: float) -> None:
         executor.reload_shaders()  # what it returns is for the caller's own reload to tell
         for node in executor.unprepared(again).values():
             if not self._closing:
@@ -232,8 +237,9 @@ class _Background:
         with self._news:
             for key in executor.unprepared(self._finished):
                 del self._finished[key]
-            self._finish({key: node for key, node in again.items() if key not in executor.unprepared(again)})
-            self._reload, self._reloaded_at = None, time.monotonic() + SETTLED
+            stale = executor.unprepared(again)
+            self._reloaded_at = self._finish({key: node for key, node in again.items() if key not in stale}, start)
+            self._reload = None
 
     def _prepare(self, ctx: moderngl.Context, executor: Executor, node: Node, size: Size) -> None:
         try:

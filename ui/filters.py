@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 
 import moderngl
@@ -15,8 +15,10 @@ from gl.plan import Plan
 from gl.profiler import Profiler
 from gl.renderer import Renderer
 from gl.shader import ShaderError
+from gl.variants import Variant, variants
 from raytrace.frame import FramePacket
 from ui.inspector import wanted_textures
+from ui.keys import METHODS_ON_KEYS
 from ui.state import PICTURE, State
 
 
@@ -50,28 +52,39 @@ class Filters:
             stack.callback(self._compiler.close)
             self._stack = stack.pop_all()
         self._profiler = Profiler(ctx)
+        self._waiting = False
+        self._prepared: tuple[object, ...] = ()
         self._shown: Graph | None = None
+        self._seen: set[Variant] = set()  # what has been drawn with, compiled in the background or not
         self.errors: list[str] = []
         self.profile: Profiler | None = None
 
     @property
     def progress(self) -> str:
-        """What is being compiled, "" for nothing."""
-        return self._compiler.text
+        """What is being compiled before the graph that is wanted can be shown, "" for nothing."""
+        return self._compiler.text if self._waiting else ""
 
-    def run(self, packet: FramePacket, state: State) -> Result:
-        """Filter ``packet`` and note in ``state`` which textures there are to look at."""
+    def run(self, packet: FramePacket, state: State) -> Result | None:
+        """Filter ``packet`` and note in ``state`` which textures there are to look at.
+
+        None: no graph's programs are there for a frame like this, so the picture that is shown stays.
+        """
         self.errors = [str(error) for error in self._compiler.reload()]
-        graph = self._wanted(packet, state)
-        if graph != self._shown and not self._ready(packet, graph):
-            # The old picture stays: it goes on with new frames. At first there is none but the noisy one.
-            graph = self._shown or Graph(graph.config, "none")
+        wanted = self._wanted(packet, state)
+        graph = self._choose(packet, wanted)
+        self._waiting = graph != wanted
+        if graph is None:
+            return None
+        if not self._waiting:
+            self._prepare_neighbours(packet, wanted)
         self._shown = graph
         self.profile = self._profiler if state.hud else None
         reset, state.reset = state.reset, ""
-        return self._renderer.run(
+        result = self._renderer.run(
             packet, graph.config, graph.denoiser, keep=graph.keep, split=graph.split, reset=reset, profiler=self.profile
         )
+        self._seen.update(variants(result.plan, packet.size))
+        return result
 
     def release(self) -> None:
         """Free everything."""
@@ -90,13 +103,34 @@ class Filters:
             state.view, state.news = PICTURE, f"{state.denoiser} has no {state.view}"
         return Graph(config, state.denoiser, wanted_textures(state, plan), split)
 
-    def _ready(self, packet: FramePacket, graph: Graph) -> bool:
-        plan = self._renderer.plan(packet, graph.config, graph.denoiser, graph.keep, split=graph.split)
+    def _choose(self, packet: FramePacket, wanted: Graph) -> Graph | None:
+        """The graph wanted if ``packet`` can run through it without compiling anything, else what can."""
+        # Asked for every frame: another size or scene may need other programs of the same graph.
         try:
-            return self._compiler.ready(plan, packet.size)
+            if self._compiler.ready(self._plan(packet, wanted), packet.size):
+                return wanted
         except ShaderError as error:
             self.errors.append(str(error))
-            return False
+        if self._shown is None:
+            # There is no old picture yet: the noisy frame's few shaders are waited for.
+            return Graph(wanted.config, "none")
+        missing = self._renderer.executor.unprepared(variants(self._plan(packet, self._shown), packet.size))
+        return self._shown if self._seen.issuperset(missing) else None
+
+    def _prepare_neighbours(self, packet: FramePacket, shown: Graph) -> None:
+        """Let the other methods' programs be compiled while nobody waits for them, so that keys act at once."""
+        now = (shown.config, shown.split, packet.size, packet.scene_id)
+        if now == self._prepared:
+            return
+        for denoiser in METHODS_ON_KEYS:
+            plan = self._plan(packet, replace(shown, denoiser=denoiser, keep=()))
+            with suppress(ShaderError):  # told when that method is shown
+                if not self._compiler.ready(plan, packet.size):
+                    return
+        self._prepared = now
+
+    def _plan(self, packet: FramePacket, graph: Graph) -> Plan:
+        return self._renderer.plan(packet, graph.config, graph.denoiser, graph.keep, split=graph.split)
 
 
 def _names(plan: Plan) -> tuple[str, ...]:

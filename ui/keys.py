@@ -109,6 +109,8 @@ MOUSE: Final = (
     ("a file dropped", "opens as a scene"),
 )
 
+METHODS_ON_KEYS: Final = tuple(binding.value for binding in BINDINGS if binding.action is Action.SHOW)
+
 BY_KEY: Final = {binding.key: binding for binding in BINDINGS}
 
 

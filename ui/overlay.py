@@ -7,8 +7,8 @@ import time
 import moderngl
 
 from ui import help, panel
-from ui.glfw_window import Event, Window
-from ui.imgui_layer import ImGuiLayer
+from ui.glfw_window import Event
+from ui.imgui_layer import ImGuiLayer, Size
 from ui.inspector import draw_inspector
 from ui.state import State
 from ui.status import Status
@@ -25,11 +25,11 @@ class Overlay:
         """Hand in what happened; returns whether it was meant for a widget and for nobody else."""
         return self._layer.feed(event)
 
-    def draw(self, window: Window, state: State, status: Status) -> None:
-        """Draw over what the window's framebuffer holds."""
+    def draw(self, window: Size, framebuffer: Size, content_scale: float, state: State, status: Status) -> None:
+        """Draw over the framebuffer that is bound; arguments as of :meth:`ui.imgui_layer.ImGuiLayer.frame`."""
         now, before = time.perf_counter(), self._drawn
         self._drawn = now
-        with self._layer.frame(window.size, window.framebuffer_size, window.content_scale, now - before):
+        with self._layer.frame(window, framebuffer, content_scale, now - before):
             if state.help:
                 help.draw()
             if state.hud:

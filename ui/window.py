@@ -253,7 +253,11 @@ class Viewer:
             self.stage.begin(self.state, self._size, self._held)
 
     def _filter(self, packet: FramePacket) -> None:
-        self._result = self._filters.run(packet, self.state)
+        result = self._filters.run(packet, self.state)
+        if result is None:
+            self._stale = True  # for the sake of the progress line
+            return
+        self._result = result
         now = time.perf_counter()
         interval, self._last = now - self._last, now
         self._pace.count(now, packet.timings["trace"] * 1e3)
@@ -284,7 +288,7 @@ class Viewer:
             self._presenter.draw(picture, screen, size, result.outputs.get("noisy"), column)
         self.status.progress = self._progress
         if self._overlaid:
-            self._overlay.draw(self.window, state, self.status)
+            self._overlay.draw(self.window.size, size, self.window.content_scale, state, self.status)
         self.window.swap()
         self._stale = False
         if state.screenshot:

@@ -149,21 +149,6 @@ class AccumulateFit(FragmentPass):
     u_alpha = Uniform("float", "[0;1] smallest weight of the new fit")
 
 
-class Restore(FragmentPass):
-    """Add to the fit what of the samples' mean difference to it is no noise."""
-
-    shader = "bmfr/restore.frag"
-    in_color = In("rgb: accumulated fitted irradiance")
-    in_direct = In("irradiance")
-    in_indirect = In("irradiance")
-    in_reprojection = In(REPROJECTION)
-    prev_residual = Prev("rgb: mean difference of samples and fit; a: root of the mean square of its luminance")
-    out_color = Out("rgba16f", "rgb: irradiance")
-    out_residual = Out("rgba16f", "rgb: mean difference of samples and fit; a: root of the mean square of its luminance")
-    u_alpha = Uniform("float", "[0;1] smallest weight of the new difference")
-    u_deviations = Uniform("float", "> 0, standard deviations of the mean that count as noise")
-
-
 def layout(features: str) -> dict[str, int]:
     """``FEATURES``, the length of a row, and for each feature ``X_AT``, its place there; -1 for what is not listed."""
     places = {f"{name.upper()}_AT": -1 for name in COMPONENTS if name != "1"}
@@ -224,17 +209,4 @@ def bmfr(g: Graph, direct: Tex, indirect: Tex, albedo: Tex, guides: Guides, p: B
             prev_color=fitted,
         ).out_color
         g.feed(fitted, clean)
-        import os
-        if "RESTORE" not in os.environ: return clean
-        a,d=map(float,os.environ["RESTORE"].split(","))
-        residual = g.history("bmfr.residual", "rgba16f")
-        restored = g.add(
-            Restore(u_alpha=a, u_deviations=d),
-            in_color=clean,
-            in_direct=direct,
-            in_indirect=indirect,
-            in_reprojection=samples.out_reprojection,
-            prev_residual=residual,
-        )
-        g.feed(residual, restored.out_residual)
-        return restored.out_color
+        return clean

@@ -64,6 +64,8 @@ def test_every_live_parameter_has_a_widget_and_no_other_has(hand):
     open_all(hand)
     for section, key, _ in LIVE:
         assert f"##{section}.{key}" in hand.boxes
+    headings = {spec.heading for _, _, spec in LIVE if spec.heading}
+    assert {"wavelet", "regression"} <= headings <= {text for text, _ in hand.words}
     assert FIXED
     assert not [name for name in FIXED if f"##{name}" in hand.boxes]
 
