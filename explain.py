@@ -12,11 +12,12 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
 
-from config import Config, Value
+from config import Config
 from gl.pipelines import DENOISERS, FrameTraits, build
 from gl.plan import Memory, Plan
 from gl.switches import DENOISER, TRAIT, Effect, effects, nearest, reasons, ways
 from gl.upload import PREFIX
+from parameter import Value
 from raytrace.compiled import CompiledScene
 from raytrace.features import compiled_in, content_of, images_of, rays_of
 from raytrace.integrator import Tracer

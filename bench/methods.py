@@ -38,7 +38,7 @@ UPLOAD = "upload"
 class Method:
     """A denoiser of gl/pipelines.py with what differs from the user's parameters. ``separate`` None: it has none.
 
-    ``preset``: its values win over the user's; empty: the user's stand.
+    ``preset``: of the denoiser's section, its values win over the user's; empty: the user's stand.
     """
 
     name: str
@@ -50,7 +50,7 @@ class Method:
     def configure(self, config: Config) -> Config:
         """``config`` as this method needs it."""
         if self.preset:
-            config = apply_preset(config, "svgf", self.preset)
+            config = apply_preset(config, self.denoiser, self.preset)
         svgf = config.svgf
         if self.separate is not None:
             svgf = replace(svgf, separate=self.separate)
@@ -62,6 +62,9 @@ ONE_SIGNAL = Method("SVGF, one signal", "svgf", separate=False)
 APART = Method("SVGF, direct and indirect", "svgf", separate=True)
 ONE_SIGNAL_TAA = replace(ONE_SIGNAL, name=f"{ONE_SIGNAL.name} + TAA", taa=True)
 APART_TAA = replace(APART, name=f"{APART.name} + TAA", taa=True)
+BMFR = Method("BMFR", "bmfr")
+BMFR_TAA = replace(BMFR, name=f"{BMFR.name} + TAA", taa=True)
+BMFR_PAPER = Method("BMFR as published", "bmfr", preset="paper")
 METHODS = (
     NOISY,
     Method("accumulation", "accumulate"),
@@ -71,6 +74,10 @@ METHODS = (
     APART_TAA,
     Method("SVGF as published", "svgf", separate=True, preset="paper"),
     Method("SVGF, reference constants", "svgf", separate=False, preset="reference"),
+    BMFR,
+    BMFR_TAA,
+    BMFR_PAPER,
+    Method("BMFR, reference constants", "bmfr", preset="reference"),
 )
 
 
@@ -101,6 +108,10 @@ class MethodResult:
     rmse_ratio: float
     temporal: float
     temporal_ratio: float
+
+    def of_pass(self, name: str) -> float:
+        """Milliseconds of the pass ``name``; 0 where there is none."""
+        return sum(row.milliseconds for row in self.passes if row.name == name)
 
     @property
     def upload(self) -> float:

@@ -12,7 +12,7 @@ from typing import Any
 
 from bench.machine import Machine
 from bench.memory import MemoryResult
-from bench.methods import APART_TAA, ONE_SIGNAL_TAA, MethodResult, QualityResult
+from bench.methods import APART_TAA, BMFR_PAPER, BMFR_TAA, ONE_SIGNAL_TAA, MethodResult, QualityResult
 from bench.tracing import TracingResult
 from config import Config
 from console import table
@@ -75,6 +75,22 @@ GOALS = (
     ),
     Goal("SVGF + TAA, one signal", "ms", 110.0, _method("cornell", ONE_SIGNAL_TAA.name, lambda m: m.milliseconds)),
     Goal("SVGF + TAA, direct and indirect", "ms", 190.0, _method("cornell", APART_TAA.name, lambda m: m.milliseconds)),
+    Goal("cornell: RMSE of BMFR / noisy", "", 0.04, _method("cornell", BMFR_TAA.name, lambda m: m.rmse_ratio)),
+    Goal(
+        "cornell: temporal error of BMFR / noisy",
+        "",
+        0.04,
+        _method("cornell", BMFR_TAA.name, lambda m: m.temporal_ratio),
+    ),
+    Goal("the same as published: RMSE", "", 0.045, _method("cornell", BMFR_PAPER.name, lambda m: m.rmse_ratio)),
+    Goal(
+        "the same as published: temporal error",
+        "",
+        0.045,
+        _method("cornell", BMFR_PAPER.name, lambda m: m.temporal_ratio),
+    ),
+    Goal("BMFR + TAA", "ms", 60.0, _method("cornell", BMFR_TAA.name, lambda m: m.milliseconds)),
+    Goal("of it the fit", "ms", 20.0, _method("cornell", BMFR_TAA.name, lambda m: m.of_pass("bmfr.fit"))),
     Goal("cornell: tracing", "ms", 60.0, _tracing("cornell", False, lambda t: t.frame.median)),
     Goal("cornell: outside Embree", "ms", 20.0, _tracing("cornell", False, lambda t: t.outside.median)),
     Goal("interior at rest: tracing", "ms", 190.0, _tracing("interior", False, lambda t: t.frame.median)),
@@ -154,8 +170,8 @@ def quality_table(result: QualityResult) -> str:
 
 
 def passes_table(result: QualityResult) -> str:
-    """Milliseconds of every pass of the two complete SVGF pipelines."""
-    chosen = [m for m in result.methods if m.name in (ONE_SIGNAL_TAA.name, APART_TAA.name)]
+    """Milliseconds of every pass of the complete pipelines."""
+    chosen = [m for m in result.methods if m.name in (ONE_SIGNAL_TAA.name, APART_TAA.name, BMFR_TAA.name)]
     names = list(dict.fromkeys(row.name for m in reversed(chosen) for row in m.passes))
     times = [{row.name: row.milliseconds for row in m.passes} for m in chosen]
     rows = [(name, *(f"{t[name]:.2f}" if name in t else "" for t in times)) for name in names]

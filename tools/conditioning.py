@@ -115,7 +115,7 @@ def block_of(positions: F64, normals: F64) -> F64:
     """The features of ``bmfr.features = "1,n,w,w2"`` with positions (..., W, 3) brought to [-1, 1]: (..., W, 10)."""
     low, high = positions.min(axis=-2, keepdims=True), positions.max(axis=-2, keepdims=True)
     widest = (high - low).max(axis=-1, keepdims=True)
-    w = (positions - (low + high) / 2) * 2 / np.maximum(high - low, widest / 8)
+    w = (positions - (low + high) / 2) * 2 / np.maximum(np.maximum(high - low, widest / 8), 1e-30)
     return np.concatenate([np.ones_like(w[..., :1]), normals - normals[..., :1, :], w, w * w], axis=-1)
 
 
@@ -145,15 +145,34 @@ def plane(rng: np.random.Generator) -> F64:
     return block_of(positions, np.broadcast_to(normals[:, :1], normals.shape))
 
 
-def far_away(rng: np.random.Generator, squared_first: bool) -> F64:
-    """A surface of one metre, a hundred metres from the origin; scaled after squaring, or before."""
+def wall(rng: np.random.Generator) -> F64:
+    """Walls across an axis: six constant columns, of which three are the normal's."""
+    positions, normals = curved(rng)
+    positions[..., 2] = 0.5
+    return block_of(positions, np.broadcast_to(normals[:, :1], normals.shape))
+
+
+def halved(rng: np.random.Generator) -> F64:
+    """Half of the block is outside of the picture and repeats the other half."""
+    features = block_of(*curved(rng))
+    features[:, ROWS // 2 :] = features[:, ROWS // 2 - 1 :: -1]
+    return features
+
+
+def squared_first(rng: np.random.Generator) -> F64:
+    """A surface one unit wide, a hundred units from the origin, whose squares are taken before scaling."""
     positions, normals = curved(rng)
     features = block_of(positions, normals)
-    if squared_first:
-        squares = (positions + 100.0) ** 2
-        low, high = squares.min(axis=-2, keepdims=True), squares.max(axis=-2, keepdims=True)
-        features[..., 7:] = (2 * squares - low - high) / (high - low)
+    squares = (positions + 100.0) ** 2
+    low, high = squares.min(axis=-2, keepdims=True), squares.max(axis=-2, keepdims=True)
+    features[..., 7:] = (2 * squares - low - high) / (high - low)
     return features
+
+
+def far_away(rng: np.random.Generator, extent: float) -> F64:
+    """Surfaces ``extent`` wide, a million units from the origin, where single precision has steps of 1/16."""
+    positions, normals = curved(rng)
+    return block_of((1e6 + extent * positions).astype(np.float32).astype(np.float64), normals)
 
 
 CASES: Final[dict[str, Callable[[np.random.Generator], F64]]] = {
@@ -162,9 +181,13 @@ CASES: Final[dict[str, Callable[[np.random.Generator], F64]]] = {
         f"two features equal but for 1e-{digits}": lambda rng, d=digits: nearly_equal(rng, 10.0**-d)  # type: ignore[misc]
         for digits in range(1, 8)
     },
-    "100 m from the origin": lambda rng: far_away(rng, False),
-    "the same, squared before it is scaled": lambda rng: far_away(rng, True),
+    "two equal features": lambda rng: nearly_equal(rng, 0.0),
+    "half of it mirrored": halved,
     "oblique plane": plane,
+    "wall across an axis": wall,
+    "1 wide at 100, squared before it is scaled": squared_first,
+    "1000 wide at 1e6": lambda rng: far_away(rng, 1e3),
+    "0.001 wide at 1e6": lambda rng: far_away(rng, 1e-3),
 }
 
 

@@ -19,6 +19,7 @@ from typing import Any, Final
 
 import config
 from errors import UserError
+from parameter import parameters as parameters_of
 from ui import keys
 
 README: Final = Path(__file__).resolve().parent.parent / "README.md"
@@ -47,7 +48,7 @@ def presets() -> str:
     rows = []
     for section in config.PRESETS:
         loaded = {name: getattr(_loaded(section, name), section) for name in config.PRESETS[section]}
-        for key in config.parameters(config.SECTIONS[section]):
+        for key in parameters_of(config.SECTIONS[section]):
             values = [json.dumps(getattr(group, key)) for group in loaded.values()]
             if key != "preset" and len(set(values)) > 1:
                 rows.append((f"`{section}.{key}`", *(f"`{value}`" for value in values)))

@@ -7,7 +7,7 @@ import time
 import moderngl
 
 from ui import help, panel
-from ui.glfw_window import Event
+from ui.glfw_window import Cursor, Event, Focus
 from ui.imgui_layer import ImGuiLayer, Size
 from ui.inspector import draw_inspector
 from ui.state import State
@@ -24,6 +24,11 @@ class Overlay:
     def feed(self, event: Event) -> bool:
         """Hand in what happened; returns whether it was meant for a widget and for nobody else."""
         return self._layer.feed(event)
+
+    def resume(self, cursor: Cursor) -> None:
+        """Drawn again after a while in which nothing was handed in: no key is held, and the mouse is at ``cursor``."""
+        for event in (Focus(False), Focus(True), cursor):
+            self._layer.feed(event)
 
     def draw(self, window: Size, framebuffer: Size, content_scale: float, state: State, status: Status) -> None:
         """Draw over the framebuffer that is bound; arguments as of :meth:`ui.imgui_layer.ImGuiLayer.frame`."""

@@ -9,8 +9,9 @@ from typing import Final
 from imgui_bundle import imgui
 
 import assets
-from config import PRESETS, SECTIONS, Param, Value, parameters, preset_values
+from config import PRESETS, SECTIONS, preset_values
 from errors import UserError
+from parameter import Param, Value, parameters
 from ui import hud, theme, widgets
 from ui.keys import BINDINGS, Action
 from ui.state import PICTURE, State

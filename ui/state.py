@@ -6,9 +6,10 @@ import dataclasses
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from config import SECTIONS, Config, Param, Value, apply_preset, parameters
+from config import SECTIONS, Config, apply_preset
 from errors import UserError
 from gl.pipelines import DENOISERS
+from parameter import Param, Value, parameters
 from ui.keys import Action, Binding
 
 UNFILTERED: Final = ("none", "reference")

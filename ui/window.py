@@ -149,8 +149,9 @@ class Viewer:
 
     def _handle(self, event: Event) -> None:
         """Note what happened. Everything that the user does comes through here; the panel's widgets come first."""
-        taken = self._overlay.feed(event) if self._overlaid else False
-        self._stale |= self._overlaid
+        overlaid = self._overlaid
+        taken = self._overlay.feed(event) if overlaid else False
+        self._stale |= overlaid
         now = time.perf_counter()
         match event:
             case Key(name, pressed) if name in keys.BY_KEY:
@@ -181,6 +182,8 @@ class Viewer:
                 self.state.looking = False
             case Exposed():
                 self._stale = True
+        if self._overlaid and not overlaid:
+            self._overlay.resume(self._cursor)
 
     @property
     def _overlaid(self) -> bool:
@@ -223,6 +226,7 @@ class Viewer:
     def _enter(self, opening: Opening) -> None:
         """Show the scene that has been prepared, or tell why it cannot be."""
         self._opening = None
+        self._stale = True  # what is told below is shown at once, before other news
         try:
             shot = opening.result()
         except UserError as error:

@@ -26,7 +26,7 @@ from gl.passes.temporal import Guides
 from raytrace.frame import Basis, Vector
 
 REPROJECTION = "xy: position in the last frame, texel units; z: mask of the 2x2 valid taps; w: history length N, frames"
-SAMPLES = "rgb: accumulated irradiance; a: frames in it, 0 where there is none"
+SAMPLES = "rgb: accumulated irradiance, finite; a: frames in it, 0 where there is none"
 
 COMPONENTS: Final = {"1": 1, "n": 3, "w": 3, "w2": 3, "w3": 3, "albedo": 3, "depth": 1}
 """Numbers that each feature contributes to a row."""
@@ -72,7 +72,7 @@ class View:
 class Accumulate(FragmentPass):
     """Find each surface point in the last frame by position and normal, and blend its sample with the history there.
 
-    Of the 2x2 texels around it those count that are near enough (sec. 3.1); there is no search farther away.
+    Of the 2x2 texels around it those count that are near enough (preprocessing); there is no search farther away.
     """
 
     shader = "bmfr/accumulate.frag"
@@ -97,7 +97,7 @@ class Accumulate(FragmentPass):
 
 
 class Fit(ComputePass):
-    """Replace each block by the least-squares combination of its features (sec. 3.2 and 3.3).
+    """Replace each block by the least-squares combination of its features (feature fitting).
 
     A work group takes a block; the grid is shifted from frame to frame, so there is one block more on each axis.
     """
@@ -139,7 +139,7 @@ class Fit(ComputePass):
 
 
 class AccumulateFit(FragmentPass):
-    """Blend the fit with those before, by the decisions of :class:`Accumulate` (sec. 3.4)."""
+    """Blend the fit with those before, by the decisions of :class:`Accumulate` (postprocessing)."""
 
     shader = "bmfr/accumulate_fit.frag"
     in_color = In("rgb: fitted irradiance")

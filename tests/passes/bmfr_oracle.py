@@ -16,8 +16,11 @@ from raytrace.frame import FramePacket
 from tests.passes.svgf_oracle import Store, exact, gather
 
 F64 = NDArray[np.float64]
+I64 = NDArray[np.int64]
 U32 = NDArray[np.uint32]
 Mask = NDArray[np.bool_]
+Taps = list[tuple[I64, I64, F64]]
+"""x, y and weight, each (H, W), of the texels to blend with."""
 
 
 @dataclass
@@ -52,7 +55,7 @@ class Oracle:
         self.memory = Memory(color, count, clean, normal, depth)
         return np.asarray(clean * packet.albedo[..., :3] + packet.emission[..., :3])
 
-    def find(self, packet: FramePacket) -> tuple[F64, list[tuple[NDArray[np.int64], NDArray[np.int64], F64]]]:
+    def find(self, packet: FramePacket) -> tuple[F64, Taps]:
         """N, and the four texels with their weights, 0 where another surface was seen."""
         height, width = packet.surface.shape[:2]
         if self.memory is None:
@@ -87,14 +90,8 @@ class Oracle:
         history = np.minimum(lengths / np.where(total > 0, total, 1.0), self.p.max_history - 1)
         return np.floor(history + 0.5) if self.p.round_history else history, taps
 
-    def blend(
-        self,
-        new: F64,
-        kept: str,
-        history: F64,
-        taps: list[tuple[NDArray[np.int64], NDArray[np.int64], F64]],
-        alpha: float,
-    ) -> F64:
+    def blend(self, new: F64, kept: str, history: F64, taps: Taps, alpha: float) -> F64:
+        """``new`` and the image ``kept`` in memory; ``new`` alone where there is no history."""
         if self.memory is None:
             return new
         total = np.sum([weight for _, _, weight in taps], axis=0)
@@ -153,7 +150,7 @@ def independent(features: F64, tolerance: float) -> list[int]:
     return kept
 
 
-def features_of(packet: FramePacket, position: F64, at: tuple[F64, F64], hit: Mask, p: Bmfr) -> F64:
+def features_of(packet: FramePacket, position: F64, at: tuple[I64, I64], hit: Mask, p: Bmfr) -> F64:
     """(pixels, M) features of a block; ``at``: its pixels, ``hit``: which of them see a surface."""
     surface = packet.surface[at].astype(np.float64)
     place = np.concatenate([position[at], surface[:, 3:]], -1)
@@ -183,25 +180,26 @@ def features_of(packet: FramePacket, position: F64, at: tuple[F64, F64], hit: Ma
     return np.asarray(features)
 
 
-def mirrored(i: NDArray[np.int64], size: int) -> NDArray[np.int64]:
+def mirrored(i: I64, size: int) -> I64:
     """Index into an image of ``size`` that goes on as its mirror image."""
     i = np.where(i < 0, -i - 1, i)
     return np.clip(np.where(i >= size, 2 * size - 1 - i, i), 0, size - 1)
 
 
 def hashed(x: U32) -> U32:
-    x = (x ^ (x >> 16)) * np.uint32(0x7FEB352D)
-    x = (x ^ (x >> 15)) * np.uint32(0x846CA68B)
-    return np.asarray(x ^ (x >> 16))
+    """Finalizer of Wellons, "lowbias32"."""
+    for shift, factor in ((16, 0x7FEB352D), (15, 0x846CA68B)):
+        x = np.asarray((x ^ (x >> np.uint32(shift))) * np.uint32(factor), np.uint32)
+    return np.asarray(x ^ (x >> np.uint32(16)), np.uint32)
 
 
 def noise_of(frame: int, block: int, side: int, features: int) -> F64:
     """(pixels, M) uniform noise in [-1, 1)."""
     pixels = np.arange(side * side, dtype=np.uint32)
     with np.errstate(over="ignore"):
-        state = hashed(hashed(np.array([frame], np.uint32)) + np.uint32(block * side * side) + pixels)
+        state: U32 = hashed(hashed(np.array([frame], np.uint32)) + np.uint32(block * side * side) + pixels)
         values = np.empty((side * side, features))
         for k in range(features):
-            state = state * np.uint32(1664525) + np.uint32(1013904223)
+            state = np.asarray(state * np.uint32(1664525) + np.uint32(1013904223), np.uint32)
             values[:, k] = (state >> 8) / 2.0**23 - 1.0
     return values

@@ -14,10 +14,11 @@ import moderngl
 import numpy as np
 import pytest
 
-from config import SECTIONS, Config, Display, Param, Svgf, Taa, parameters
+from config import SECTIONS, Config, Display, Svgf, Taa
 from gl.executor import Result
 from gl.graph import GraphError
 from gl.renderer import Renderer, read
+from parameter import Param, parameters
 from raytrace.frame import FramePacket
 from tests.passes.harness import frame, noise
 

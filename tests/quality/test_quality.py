@@ -8,6 +8,7 @@ references are 1024 paths per pixel of two frames of a flight through the Cornel
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 
 import assets
 from bench.metrics import rmse, temporal_difference
-from config import Config, Firefly, Svgf, Taa, load
+from config import Bmfr, Config, Firefly, Svgf, Taa, load
 from gl.renderer import Renderer, read
 from raytrace.compiled import compile_scene
 from raytrace.frame import FramePacket
@@ -70,9 +71,15 @@ class Score(NamedTuple):
     energy: float
 
 
-def score(ctx: moderngl.Context, case: Case, denoiser: str, parameters: Svgf, firefly: Firefly | None = None) -> Score:
+def score(
+    ctx: moderngl.Context, case: Case, denoiser: str, parameters: Svgf | Bmfr, firefly: Firefly | None = None
+) -> Score:
     renderer = Renderer(ctx)
-    config = Config(svgf=parameters, taa=Taa(enabled=False), firefly=firefly or Firefly())
+    config = Config(taa=Taa(enabled=False), firefly=firefly or Firefly())
+    if isinstance(parameters, Bmfr):
+        config = replace(config, bmfr=parameters)
+    else:
+        config = replace(config, svgf=parameters)
     images: list[F32] = []
     for packet in case.packets:
         result = renderer.run(packet, config, denoiser)
@@ -175,3 +182,43 @@ def test_accumulation_alone_lies_between(ctx: moderngl.Context, case: Case, whol
     assert 1.2 * whole.error < alone.error < 0.4
     assert 3.0 * whole.flicker < alone.flicker < 0.4
     assert alone.energy == pytest.approx(1.0, abs=0.01)
+
+
+@pytest.fixture(scope="module")
+def regressed(_session_context: moderngl.Context, case: Case) -> Score:
+    """Of blockwise regression as it is set up by default."""
+    with _session_context:
+        return score(_session_context, case, "bmfr", Bmfr())
+
+
+def test_bmfr_beats_the_noisy_frame(regressed: Score) -> None:
+    assert regressed.error < 0.18
+    assert regressed.flicker < 0.045
+    assert regressed.energy == pytest.approx(1.0, abs=0.03)
+
+
+@pytest.mark.parametrize("preset", ["paper", "reference"])
+def test_larger_blocks_lose_narrow_shadows(ctx: moderngl.Context, case: Case, regressed: Score, preset: str) -> None:
+    """In so small a picture a block of 32 pixels holds much of the room."""
+    published = score(ctx, case, "bmfr", load(None, (f"bmfr.preset={preset}",)).bmfr)
+    assert regressed.error < published.error < 0.24
+    assert published.flicker < 0.05
+    assert published.energy == pytest.approx(1.0, abs=0.03)
+
+
+WORSE = {
+    "second accumulation": (Bmfr(alpha_fit=1.0), 1.05, 4.0),
+    "squares": (Bmfr(features="1,n,w"), 1.2, 1.1),
+    "positions": (Bmfr(features="1,n"), 2.0, 1.3),
+    "features": (Bmfr(features="1"), 3.0, 1.5),
+    "little noise": (Bmfr(regularization="noise", noise=1.0), 2.0, 1.2),
+}
+"""What is missing, and at least so many times the error and the flicker for it."""
+
+
+@pytest.mark.parametrize("part", WORSE)
+def test_every_part_of_the_regression_is_needed(ctx: moderngl.Context, case: Case, regressed: Score, part: str) -> None:
+    parameters, error, flicker = WORSE[part]
+    without = score(ctx, case, "bmfr", parameters)
+    assert without.error > error * regressed.error
+    assert without.flicker > flicker * regressed.flicker

@@ -13,7 +13,7 @@ import pytest
 from numpy.typing import NDArray
 
 import assets
-from config import Config, Taa
+from config import Config, Taa, load
 from gl.renderer import Renderer, read
 from images import to_srgb8
 from raytrace.compiled import compile_scene
@@ -33,6 +33,8 @@ METHODS = {
     "noisy": ("none", Config()),
     "svgf": ("svgf", Config(taa=Taa(enabled=False))),
     "svgf_taa": ("svgf", Config()),
+    "bmfr": ("bmfr", Config(taa=Taa(enabled=False))),
+    "bmfr_paper": ("bmfr", load(None, ("bmfr.preset=paper", "taa.enabled=false"))),
 }
 GUIDES = ("frame.albedo", "frame.surface", "frame.motion", "frame.emission", "svgf.reproject.out_reprojection")
 

@@ -7,6 +7,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -249,7 +250,10 @@ def test_every_goal_reads_a_report_of_both_scenes():
         for scene, moves in cases
     )
     full = small_report()
-    quality = replace(full.quality[0], methods=(*full.quality[0].methods, method_result(methods.ONE_SIGNAL_TAA.name)))
+    named = (methods.ONE_SIGNAL_TAA, methods.BMFR_TAA, methods.BMFR_PAPER)
+    quality = replace(
+        full.quality[0], methods=(*full.quality[0].methods, *(method_result(method.name) for method in named))
+    )
     full = replace(full, quality=(quality,), tracing=traced)
     assert all(goal.find(full) is not None for goal in GOALS)
     assert report.goals_table(full).count("150.0 ms") == 6
@@ -356,7 +360,8 @@ def test_methods_change_only_what_is_theirs(separate):
 
 
 def test_a_method_with_a_preset_has_all_of_it_and_nothing_of_the_user_s():
-    own = load(None, ["svgf.prefilter=true", "svgf.max_history=20", "svgf.iterations=2"])
-    for preset in ("paper", "reference"):
-        (method,) = [method for method in METHODS if method.preset == preset]
-        assert method.configure(own).svgf == load(None, [f"svgf.preset={preset}"]).svgf
+    own = load(None, ["svgf.prefilter=true", "svgf.max_history=20", "svgf.iterations=2", "bmfr.block=9"])
+    for denoiser, preset in product(("svgf", "bmfr"), ("paper", "reference")):
+        (method,) = [method for method in METHODS if (method.denoiser, method.preset) == (denoiser, preset)]
+        expected = load(None, [f"{denoiser}.preset={preset}"])
+        assert getattr(method.configure(own), denoiser) == getattr(expected, denoiser)

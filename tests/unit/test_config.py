@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from config import PRESETS, SECTIONS, Config, Svgf, apply_preset, describe, load, parameters, preset_values
+from config import PRESETS, SECTIONS, Config, Svgf, apply_preset, describe, load, preset_values
 from errors import UserError
+from parameter import parameters
 
 ROOT = Path(__file__).resolve().parents[2]
 

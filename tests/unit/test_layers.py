@@ -12,7 +12,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 COMMANDS = {"app", "cli", "demo", "doctor", "explain", "headless", "session"}
-HELPERS = {"config", "console", "errors", "images", "storage"}
+HELPERS = {"config", "console", "errors", "images", "parameter", "storage"}
 OURS = COMMANDS | HELPERS | {"assets", "bench", "gl", "raytrace", "tests", "tools", "ui"}
 OPENGL = {"moderngl", "glcontext", "OpenGL"}
 EMBREE = {"embreex", "trimesh"}
@@ -36,22 +36,27 @@ def layer(path: str, ours: str, banned: set[str], only: set[str] | None = None) 
 
 LAYERS = [
     layer("errors.py", "", set(), only=set()),
-    layer("config.py", "errors", set(), only=set()),
+    layer("parameter.py", "errors", set(), only=set()),
+    layer("config.py", "errors parameter", set(), only=set()),
     # What gl/ loads of raytrace/: neither may bring the tracer along.
     layer("raytrace/__init__.py", "", set(), only=set()),
     layer("raytrace/frame.py", "errors", set(), only={"numpy"}),
     layer("assets", "assets raytrace errors", OPENGL | EMBREE | WINDOWS),
     layer("raytrace", "raytrace config errors", OPENGL | WINDOWS),
-    layer("gl", "gl raytrace.frame config errors", EMBREE | WINDOWS),
-    layer("ui", "ui assets gl raytrace config console errors images session", EMBREE),
-    layer("bench", "assets bench gl raytrace config console errors session storage", OPENGL | WINDOWS | {"embreex"}),
+    layer("gl", "gl raytrace.frame config parameter errors", EMBREE | WINDOWS),
+    layer("ui", "ui assets gl raytrace config parameter console errors images session", EMBREE),
+    layer(
+        "bench",
+        "assets bench gl raytrace config parameter console errors session storage",
+        OPENGL | WINDOWS | {"embreex"},
+    ),
     layer(
         "app.py",
         "assets bench cli config demo doctor errors explain gl headless raytrace ui",
         OPENGL | EMBREE | WINDOWS,
     ),
-    layer("explain.py", "config gl raytrace session ui.state", OPENGL | EMBREE | WINDOWS),
-    layer("tools", "tools assets bench cli config errors gl images raytrace session ui.keys", WINDOWS),
+    layer("explain.py", "config parameter gl raytrace session ui.state", OPENGL | EMBREE | WINDOWS),
+    layer("tools", "tools assets bench cli config parameter errors gl images raytrace session ui", WINDOWS),
 ]
 
 

@@ -6,9 +6,10 @@ from dataclasses import replace
 
 import pytest
 
-from config import Render, parameters
+from config import Render
 from gl.graph import ONE_TEXEL, Graph, GraphError, Out, Tex
 from gl.plan import Slot, check_no_feedback, texture_bytes, texture_size
+from parameter import parameters
 from tests.unit.small_graphs import COLOR, Blur, Show, Source, Temporal, Tiles, blur, example
 
 # --------------------------------------------------------------------------------------------- culling and histories

@@ -44,7 +44,7 @@ CASES: dict[str, tuple[Config, str, FrameTraits]] = {
     "bmfr": (Config(), "bmfr", FrameTraits()),
     "bmfr_paper": (load(None, ("bmfr.preset=paper",)), "bmfr", FrameTraits()),
     "bmfr_reference": (load(None, ("bmfr.preset=reference",)), "bmfr", FrameTraits()),
-    "bmfr_albedo": (load(None, ("bmfr.features=\"1,albedo,w\"",)), "bmfr", FrameTraits()),
+    "bmfr_albedo": (load(None, ('bmfr.features="1,albedo,w"',)), "bmfr", FrameTraits()),
     "bmfr_moving": (Config(), "bmfr", FrameTraits(moving=True)),
     "bmfr_on_hardware": (Config(), "bmfr", FrameTraits(software=False)),
     "svgf_moving": (Config(), "svgf", FrameTraits(moving=True)),

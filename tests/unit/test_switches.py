@@ -8,10 +8,11 @@ from typing import Any
 
 import pytest
 
-from config import SECTIONS, Config, load, parameters
+from config import SECTIONS, Config, load
 from gl.pipelines import DENOISERS, FrameTraits, build
 from gl.plan import Plan
 from gl.switches import DENOISER, TRAIT, Effect, _with, compare, effects, nearest, reasons, ways
+from parameter import parameters
 from tests.unit.small_graphs import example
 
 STILL, MOVING = FrameTraits(), FrameTraits(moving=True)

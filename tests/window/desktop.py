@@ -174,13 +174,29 @@ class App:
 
     def hear(self, pattern: str, since: int = 0, seconds: float = SECONDS) -> re.Match[str]:
         """Where ``pattern`` matches what was printed after the first ``since`` characters; waits for it."""
-        return wait_for(lambda: re.compile(pattern, re.MULTILINE).search(self.stdout(), since), repr(pattern), seconds)
+
+        def found() -> re.Match[str] | None:
+            assert self.process.poll() is None, self.stderr()
+            return re.compile(pattern, re.MULTILINE).search(self.stdout(), since)
+
+        return wait_for(found, repr(pattern), seconds)
 
     def ask(self, key: str, pattern: str) -> re.Match[str]:
         """Press ``key`` and wait until a line is printed that ``pattern`` matches."""
         since = len(self.stdout())
         self.press(key)
         return self.hear(pattern, since)
+
+    def click(self, button: int, pattern: str) -> re.Match[str]:
+        """The same for a button of the mouse; 4 and 5 are the wheel, away from the hand and back."""
+        since = len(self.stdout())
+        self.xdotool("click", button)
+        return self.hear(pattern, since)
+
+    def mouse(self) -> tuple[int, int]:
+        """Where the mouse is on the screen, from the top left."""
+        place = dict(word.split(":") for word in self.xdotool("getmouselocation").split())
+        return int(place["x"]), int(place["y"])
 
     def passes(self) -> list[str]:
         """The passes of the frame shown, as ``--log`` last told them."""
@@ -195,6 +211,11 @@ class App:
         after_name = Path(f"/proc/{self.process.pid}/stat").read_text().rpartition(")")[2].split()
         return (int(after_name[11]) + int(after_name[12])) / os.sysconf("SC_CLK_TCK")
 
+    def megabytes(self) -> float:
+        """Memory that the program holds."""
+        pages = int(Path(f"/proc/{self.process.pid}/statm").read_text().split()[1])
+        return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+
     def stderr(self) -> str:
         return (self.folder / "stderr.txt").read_text()
 
@@ -202,7 +223,7 @@ class App:
         return (self.folder / "stdout.txt").read_text()
 
 
-class _ClientMessage(ctypes.Structure):
+class ClientMessage(ctypes.Structure):
     """Xlib's XClientMessageEvent."""
 
     _fields_ = (
@@ -218,14 +239,21 @@ class _ClientMessage(ctypes.Structure):
     )
 
 
-def send_delete(display: str, window: int) -> None:
-    """Ask ``window`` to close itself (ICCCM 4.2.8.1)."""
+def xlib() -> ctypes.CDLL:
+    """Xlib, its functions declared as far as their results are no int."""
     x = ctypes.CDLL("libX11.so.6")
     x.XOpenDisplay.restype = ctypes.c_void_p
-    x.XInternAtom.restype = ctypes.c_ulong
+    for function in (x.XInternAtom, x.XDefaultRootWindow, x.XCreateSimpleWindow):
+        function.restype = ctypes.c_ulong
+    return x
+
+
+def send_delete(display: str, window: int) -> None:
+    """Ask ``window`` to close itself (ICCCM 4.2.8.1)."""
+    x = xlib()
     connection = ctypes.c_void_p(x.XOpenDisplay(display.encode()))
     protocols, delete = (x.XInternAtom(connection, name, 0) for name in (b"WM_PROTOCOLS", b"WM_DELETE_WINDOW"))
-    message = _ClientMessage(type=33, window=window, message_type=protocols, format=32)
+    message = ClientMessage(type=33, window=window, message_type=protocols, format=32)
     message.data[0] = delete
     x.XSendEvent(connection, ctypes.c_ulong(window), 0, ctypes.c_long(0), ctypes.byref(message))
     x.XCloseDisplay(connection)

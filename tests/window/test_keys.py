@@ -5,7 +5,7 @@ screen, or in the passes that the frame runs through.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from itertools import pairwise
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
@@ -28,7 +28,8 @@ def shared(display: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[A
 @pytest.fixture
 def app(shared: App) -> Iterator[App]:
     """SVGF at rest, the camera at its beginning, everything as the program starts; to be left like that."""
-    shared.press("1", "r", "h")
+    shared.press("1", "r")
+    shared.ask("h", "history reset")
     shared.await_passes(plan("svgf"))
     yield shared
     assert shared.process.poll() is None, shared.stderr()
@@ -84,38 +85,46 @@ def previous(app: App) -> None:
     assert roughness(app.picture()) > 0.02
 
 
-def jitter(app: App) -> None:
-    """What stands still is at other places of the pixels in every frame, or not: seen in the tracer's albedo."""
+def look(app: App, key: str) -> str:
+    """What is looked at after ``key``: the name of a texture, or "the picture"."""
+    return app.ask(key, r"^frame \d+: (\w+(?:\.\w+)+|the picture)$")[1]
 
-    def images() -> list[F32]:
-        found = []
-        for _ in range(4):
-            app.ask("h", "history reset")  # another frame than the one before
-            found.append(on_screen(app))
-        return found
+
+@contextmanager
+def albedo(app: App) -> Iterator[Callable[[], F32]]:
+    """Looks at the tracer's albedo, free of noise: yields what makes another frame and returns how it looks."""
+
+    def another() -> F32:
+        app.ask("h", "history reset")
+        return on_screen(app)
 
     views = []
-    while not views or "albedo" not in views[-1]:
-        views.append(app.ask("b", r"^frame \d+: (.*)$")[1])
+    while not views or views[-1] != "frame.albedo":
+        views.append(look(app, "b"))
         assert views[-1] != "the picture", f"no albedo among {views}"
-    lively = images()
-    assert max(difference(lively[0], image) for image in lively[1:]) > 1e-4
-    app.ask("F6", "render.jitter = off")
-    calm = images()
-    assert max(difference(calm[0], image) for image in calm[1:]) < 1e-5
-    app.ask("F6", "render.jitter = on")
+    yield another
     for view in [*views[-2::-1], "the picture"]:
         app.ask("v", view)
 
 
+def jitter(app: App) -> None:
+    """Edges lie elsewhere within the pixels in every frame, or not."""
+    with albedo(app) as another:
+        assert len({another().tobytes() for _ in range(3)}) > 1
+        app.ask("F6", "render.jitter = off")
+        assert len({another().tobytes() for _ in range(3)}) == 1
+        app.ask("F6", "render.jitter = on")
+        assert len({another().tobytes() for _ in range(3)}) > 1
+
+
 def tone_curve(app: App) -> None:
-    brightness = [app.settled().mean()]
+    pictures = {}
     for name in ("none", "reinhard", "aces"):
         app.ask("F9", f"display.tonemap = {name}")
-        brightness.append(app.settled().mean())
-    # Measured: 0.0002 between two pictures by the same curve, 0.0025 or more otherwise.
-    assert abs(brightness[3] - brightness[0]) < 1e-3
-    assert min(abs(one - other) for one, other in pairwise(brightness)) > 1e-3
+        pictures[name] = app.settled()
+    assert difference(pictures["none"], pictures["aces"]) > 3 * STILL
+    # Only Reinhard's curve leaves the lamp a little below white.
+    assert [bool(pictures[name].max() == 1.0) for name in pictures] == [True, False, True]
 
 
 def exposure(key: str, back: str, sign: int) -> Callable[[App], None]:
@@ -139,12 +148,15 @@ def animation(app: App) -> None:
 
 
 def single_step(app: App) -> None:
-    before = app.settled()
-    for _ in range(12):
-        app.ask("period", "one step of the animation")
-    after = app.settled()
-    assert difference(before, after) > 1.5 * STILL
-    assert difference(after, app.settled()) < STILL, "it stops there"
+    app.ask("F6", "render.jitter = off")
+    with albedo(app) as another:
+        for _ in range(2):
+            before = another()
+            app.ask("period", "one step of the animation")
+            after = another()
+            assert not np.array_equal(before, after)
+            assert np.array_equal(after, another()), "it stops there"
+    app.ask("F6", "render.jitter = on")
 
 
 def next_scene(app: App) -> None:
@@ -168,16 +180,21 @@ def history(app: App) -> None:
     assert difference(before, app.picture("h")) > STILL, "noisier with fewer frames in it"
 
 
-def texture(key: str, back: str) -> Callable[[App], None]:
-    def check(app: App) -> None:
-        app.settled()
-        before = on_screen(app)
-        name = app.ask(key, r"^frame \d+: (\w+\.[\w.]+)$")[1]
-        wait_for(lambda: difference(before, on_screen(app)) > 10 * STILL, f"{name} on the screen")
-        app.ask(back, "the picture")
-        wait_for(lambda: difference(before, on_screen(app)) < 2 * STILL, "the picture on the screen")
+def next_texture(app: App) -> None:
+    app.settled()
+    before = on_screen(app)
+    name = look(app, "b")
+    wait_for(lambda: difference(before, on_screen(app)) > 10 * STILL, f"{name} on the screen")
+    app.ask("v", "the picture")
+    wait_for(lambda: difference(before, on_screen(app)) < 2 * STILL, "the picture on the screen")
 
-    return check
+
+def texture_before(app: App) -> None:
+    there = [look(app, "b") for _ in range(3)]
+    back = [look(app, "v") for _ in range(4)]
+    assert back[:3] == [*there[1::-1], "the picture"]
+    assert back[3] not in there, "before the first comes the last"
+    app.ask("b", "the picture")
 
 
 def split(app: App) -> None:
@@ -198,13 +215,18 @@ def overlay(key: str, name: str) -> Callable[[App], None]:
     """``key`` draws text over the picture, and takes it away."""
 
     def check(app: App) -> None:
-        app.xdotool("mousemove", "--window", app.window, 200, 100)
+        app.xdotool("mousemove", "--window", app.window, WINDOW[0] // 2, WINDOW[1] // 2)
         app.settled()
         before = on_screen(app)
+
+        def changed() -> int:
+            """How many pixels are quite another colour now."""
+            return int((np.abs(on_screen(app) - before).max(axis=2) > 0.2).sum())
+
         app.ask(key, f"{name} on")
-        wait_for(lambda: difference(before, on_screen(app)) > 3 * STILL, f"{name} over the picture")
+        wait_for(lambda: changed() > 1000, f"{name} over the picture")
         app.ask(key, f"{name} off")
-        wait_for(lambda: difference(before, on_screen(app)) < STILL, "the picture alone")
+        wait_for(lambda: changed() < 100, "the picture alone")
 
     return check
 
@@ -249,17 +271,17 @@ def flight(key: str, moved: int, sign: int) -> Callable[[App], None]:
     def check(app: App) -> None:
         before = place(app.settled())[moved]
         app.hold(key, 0.4)
-        assert sign * (place(app.settled())[moved] - before) > 2.0
+        assert sign * (place(app.settled())[moved] - before) > 0.5
 
     return check
 
 
 def fast(app: App) -> None:
     start = place(app.settled())[0]
-    app.hold("d", 0.15)
+    app.hold("d", 0.4)
     slow = start - place(app.settled())[0]
     app.ask("r", "camera reset")
-    app.xdotool("windowfocus", app.window, "keydown", "Shift_L", "keydown", "d", "sleep", 0.15, "keyup", "d")
+    app.xdotool("windowfocus", app.window, "keydown", "Shift_L", "keydown", "d", "sleep", 0.4, "keyup", "d")
     app.xdotool("keyup", "Shift_L")
     assert start - place(app.settled())[0] > 1.5 * slow > 0.0
 
@@ -289,8 +311,8 @@ CHECKS: dict[str, Callable[[App], None]] = {
     "N": next_scene,
     "R": camera_home,
     "H": history,
-    "B": texture("b", "v"),
-    "V": texture("v", "b"),
+    "B": next_texture,
+    "V": texture_before,
     "X": split,
     "I": overlay("i", "inspect"),
     "EQUAL": resolution("equal", "minus", (213, 120)),
@@ -319,6 +341,7 @@ def test_every_check_is_of_a_key_there_is() -> None:
     assert list(CHECKS) == [binding.key for binding in BINDINGS]
 
 
-def test_escape_quits(app: App) -> None:
-    app.press("Escape")
-    assert app.process.wait(10.0) == 0
+def test_escape_quits(shared: App) -> None:
+    shared.press("Escape")
+    assert shared.process.wait(10.0) == 0
+    assert shared.stderr() == ""

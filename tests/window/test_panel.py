@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 import assets
-from config import SECTIONS, apply_preset, parameters
+from config import SECTIONS, apply_preset
 from errors import UserError
 from gl.pipelines import DENOISERS
+from parameter import parameters
 from tests.window.hand import TALL, Hand, watching
 from ui import panel, theme
 from ui.glfw_window import Char, Cursor, Key, MouseButton

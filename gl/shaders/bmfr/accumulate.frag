@@ -1,4 +1,4 @@
-// Blend this frame's sample with the history of the same surface. Koskela et al. 2019, sec. 3.1.
+// Blend this frame's sample with the history of the same surface. Koskela et al. 2019, preprocessing.
 //
 // Reprojection and blending in one: both read the same texels. bmfr/accumulate_fit.frag blends by the same decisions.
 

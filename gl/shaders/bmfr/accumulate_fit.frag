@@ -1,4 +1,4 @@
-// Blend the fitted picture with those of the frames before. Koskela et al. 2019, sec. 3.4.
+// Blend the fitted picture with those of the frames before. Koskela et al. 2019, postprocessing.
 //
 // The texels to blend with are those that bmfr/accumulate.frag has accepted.
 

@@ -1,4 +1,4 @@
-// Fit every block of the noisy picture by a linear combination of noise-free features. Koskela et al. 2019, sec. 3.2, 3.3.
+// Fit every block of the noisy picture by noise-free features. Koskela et al. 2019, feature fitting.
 //
 // One work group per block of GROUP_X x GROUP_Y pixels. X_AT: place of feature X's first component in a row; what is not
 // in the list of features is neither computed nor read. NOISE: stochastic regularisation. UNIT: scale to [0, 1].
@@ -8,7 +8,7 @@ layout(local_size_x = THREADS) in;
 #include "common/finite.glsl"
 #include "bmfr/solver.glsl"
 
-uniform sampler2D in_color;   // rgb: accumulated irradiance; a: samples in it, 0: none
+uniform sampler2D in_color;   // rgb: accumulated irradiance, finite; a: samples in it, 0: none
 uniform sampler2D in_surface; // normal, depth
 #if HAS_IN_ALBEDO
 uniform sampler2D in_albedo;
@@ -79,7 +79,7 @@ void scale_to_block(int thread) {
     origin = low;
     scale = 1.0 / span;
 #else
-    origin = 0.5 * low + 0.5 * high; // the sum might overflow
+    origin = 0.5 * (low + high);
     scale = 2.0 / span;
 #endif
 }
@@ -145,7 +145,7 @@ void fold_block(int thread) {
         EACH(ADD_NOISE)
 #endif
         // Select, do not multiply: a row of zeros changes nothing, 0 · NaN would change everything.
-        bool counts = is_surface(surface, place) && color.a > 0.0 && is_finite(color);
+        bool counts = is_surface(surface, place) && color.a > 0.0;
         EACH(SELECT)
         for (int k = FEATURES; k < COLUMNS; ++k) row[k] = counts ? row[k] : 0.0;
         fold_row();

@@ -1,7 +1,7 @@
 // Linear least squares by Givens rotations, for FEATURES features and the three channels of a colour.
 //
 // Every invocation folds rows (features, colour) into an upper triangle of its own; the group's triangles are then merged
-// through shared memory, and one invocation solves. Nothing but the triangle is kept: Koskela et al. 2019, sec. 3.3,
+// through shared memory, and one invocation solves. Nothing but the triangle is kept: Koskela et al. 2019
 // leave out Q in the same way. A rotation cannot cancel, so no sign has to be chosen as for Householder reflections.
 //
 // The triangle must stay in registers. Compilers see to that only where every index is constant, and they do not unroll
