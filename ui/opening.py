@@ -74,7 +74,10 @@ class Opening:
         if outcome is None:
             raise RuntimeError(f"{self.name}: the result was taken, or is not wanted")
         if isinstance(outcome, BaseException):
-            raise outcome
+            try:
+                raise outcome
+            finally:
+                del outcome  # see _work
         return outcome
 
     def close(self) -> None:
@@ -106,10 +109,14 @@ class Opening:
         self._notify()
 
     def _work(self) -> None:
-        outcome: Shot | BaseException
+        # An error and a frame of its traceback that knows it by name keep each other, and with them all that the frames
+        # hold, such as half a scene. Nobody would collect that cycle: see _no_full_collections.
+        outcome: Shot | BaseException | None = None
         try:
             with _one_at_a_time, _no_full_collections():
                 outcome = open_shot(*self._arguments, log=self)
+        except _ClosedError:
+            pass
         except BaseException as error:  # whatever it is, it is raised where the shot is waited for
             outcome = error
         with self._guard:
@@ -117,6 +124,7 @@ class Opening:
             self._outcome = outcome if wanted else None
         if isinstance(outcome, Shot) and not wanted:
             outcome.tracer.close()
+        del outcome
         self._finished.set()
         self._notify()
 

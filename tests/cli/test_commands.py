@@ -75,13 +75,29 @@ def test_with_a_display_there_is_a_window(app: App, monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(window, "run", lambda settings, *rest: calls.append((settings.render.seed, *rest)))
     monkeypatch.setenv(variable, ":7")
     app()
-    app(
-        "--scene", "interior", "--denoiser", "none", "--camera", "flight", "--no-animate", "--out", "shots", "--seed", 3
+    flags = ("--scene", "interior", "--denoiser", "none", "--camera", "flight", "--out", "shots", "--seed", 3)
+    app(*flags, "--no-animate", "--no-hud", "--log", "--size", "64x36")
+    default = window.Wishes(
+        scene="cornell",
+        denoiser="svgf",
+        camera="still",
+        animate=True,
+        out=Path("out"),
+        hud=True,
+        calibrate=True,
+        log=False,
     )
-    assert calls == [
-        (0, "cornell", "svgf", "still", True, Path("out")),
-        (3, "interior", "none", "flight", False, Path("shots")),
-    ]
+    asked = window.Wishes(
+        scene="interior",
+        denoiser="none",
+        camera="flight",
+        animate=False,
+        out=Path("shots"),
+        hud=False,
+        calibrate=False,
+        log=True,
+    )
+    assert calls == [(0, default), (3, asked)]
 
 
 def test_an_empty_variable_is_no_display(app: App, monkeypatch: pytest.MonkeyPatch) -> None:

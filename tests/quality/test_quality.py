@@ -76,10 +76,8 @@ def score(
 ) -> Score:
     renderer = Renderer(ctx)
     config = Config(taa=Taa(enabled=False), firefly=firefly or Firefly())
-    if isinstance(parameters, Bmfr):
-        config = replace(config, bmfr=parameters)
-    else:
-        config = replace(config, svgf=parameters)
+    own = {"bmfr": parameters} if isinstance(parameters, Bmfr) else {"svgf": parameters}
+    config = replace(config, **own)
     images: list[F32] = []
     for packet in case.packets:
         result = renderer.run(packet, config, denoiser)
