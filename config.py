@@ -129,10 +129,20 @@ class Bmfr(Section):
         structural=True,
         heading="regression",
     )
-    block: int = param(24, 8, 64, "[8;64] side of a block, in pixels", structural=True)
+    block: int = param(32, 8, 64, "[8;64] side of a block, in pixels", structural=True)
+    part: int = param(
+        16,
+        0,
+        32,
+        "[0;32] side of the parts that are fitted again around the block's fit: a half or a quarter of block; 0: none",
+        structural=True,
+    )
+    caution: float = param(
+        1.5, 0, 100, "[0;100] doubt in a part's own fit: variances that noise is expected to explain in each feature"
+    )
     unit_scale: bool = param(False, doc="scale positions to [0, 1] in every block, not to [-1, 1]", structural=True)
     regularization: str = param(
-        "rank",
+        "both",
         choices=("noise", "rank", "both"),
         doc="against features that depend on each other: noise added to them, a rank test, or both",
         structural=True,
@@ -149,6 +159,10 @@ class Bmfr(Section):
             raise UserError(f'[bmfr] features: must begin with the constant, "1", not {names[0]!r}')
         if "roughness" in names:
             raise UserError("[bmfr] features: frames have no roughness yet, every surface is diffuse")
+        if self.part and self.part * 2 != self.block and self.part * 4 != self.block:
+            fitting = [side // n for side, n in ((self.block, 2), (self.block, 4)) if side % n == 0]
+            known = " or ".join(str(side) for side in [0, *fitting])
+            raise UserError(f"[bmfr] part: with blocks of {self.block} pixels must be {known}, not {self.part}")
 
 
 @dataclass(frozen=True)
@@ -248,6 +262,7 @@ PRESETS: dict[str, dict[str, dict[str, Value]]] = {
             "alpha_fit": 0.1,
             "features": "1,n,w,w2",
             "block": 32,
+            "part": 0,
             "unit_scale": False,
             "regularization": "noise",
             "noise": 0.01,
@@ -259,12 +274,13 @@ PRESETS: dict[str, dict[str, dict[str, Value]]] = {
             "alpha_fit": 0.1,
             "features": "1,n,w,w2",
             "block": 32,
+            "part": 0,
             "unit_scale": True,
             "regularization": "noise",
             "noise": 0.01,
         },
-        # What measured best in error at equal time on the Cornell flight (docs/bmfr.md).
-        "best": {"block": 24, "regularization": "rank"},
+        # What measured best in error at equal time on flights through both scenes (docs/bmfr.md).
+        "best": {"part": 16, "regularization": "both"},
     },
 }
 """section -> value of its ``preset`` key -> values of the keys it owns. A key set by file or ``--set`` wins over it.

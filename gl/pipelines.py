@@ -12,7 +12,7 @@ from config import Config, Display
 from gl.graph import Graph, Tex
 from gl.passes import display
 from gl.passes.bad_pixels import mark_bad
-from gl.passes.bmfr import View, bmfr, thread_count
+from gl.passes.bmfr import View, bmfr, part_count, thread_count
 from gl.passes.exposure import auto_exposure
 from gl.passes.firefly import reject_fireflies
 from gl.passes.svgf import svgf
@@ -113,7 +113,7 @@ def _svgf(g: Graph, config: Config, traits: FrameTraits) -> Tex:
 
 def _bmfr(g: Graph, config: Config, traits: FrameTraits) -> Tex:
     s, p = Signals(g, config), config.bmfr
-    threads = thread_count(p.features, traits.software)
+    threads = thread_count(p.features, traits.software, part_count(p))
     view = View(traits.basis, traits.jitter, traits.pixel_size, traits.index, threads)
     clean = bmfr(g, s.direct, s.indirect, s.albedo, Guides(g, traits.moving), p, view)
     return g.add(display.Modulate(), in_direct=clean, in_albedo=s.albedo, in_emission=s.emission).out_radiance

@@ -13,6 +13,8 @@ Deviations from the paper:
   given in widths of a pixel, so that it suits every scene.
 * Where the sky is seen, and where there is no finite sample, a pixel takes no part in the fit.
 * A rank test can take the place of the noise, or go along with it.
+* Each part of a block may be fitted again around the block's fit, shrunk by its uncertainty (``bmfr/parts.glsl``). Light
+  that no polynomial expresses over 32 pixels is most of the paper's error.
 """
 
 from __future__ import annotations
@@ -113,6 +115,7 @@ class Fit(ComputePass):
     u_seed = Uniform("uint", "of the noise, another one for each frame")
     u_noise = Uniform("float", "[0;1] largest noise added to a feature")
     u_rank_tolerance = Uniform("float", "> 0, what of a feature is neglected, root of the mean square over the block")
+    u_caution = Uniform("float", ">= 0, variances that noise is expected to explain in each feature of a part's own fit")
 
     def __init__(self, p: Bmfr, view: View) -> None:
         shift = OFFSETS[view.index % len(OFFSETS)]
@@ -123,6 +126,7 @@ class Fit(ComputePass):
                 "THREADS": view.threads,
                 "NOISE": int(p.regularization != "rank"),
                 "UNIT": int(p.unit_scale),
+                **({"PARTS": part_count(p), "PART": p.part} if p.part else {}),
             },
             u_view=view.rows,
             u_jitter=view.jitter,
@@ -130,6 +134,7 @@ class Fit(ComputePass):
             u_seed=view.index,
             u_noise=p.noise,
             u_rank_tolerance=1e-7 if p.regularization == "noise" else p.rank_tolerance,
+            u_caution=p.caution,
         )
 
     def work_groups(self, size: tuple[int, int]) -> tuple[int, int]:
@@ -160,19 +165,25 @@ def layout(features: str) -> dict[str, int]:
     return {"FEATURES": length, **places}
 
 
-def thread_count(features: str, software: bool) -> int:
+def part_count(p: Bmfr) -> int:
+    """Parts of a block that are fitted again; 0 if ``part`` is."""
+    return (p.block // p.part) ** 2 if p.part else 0
+
+
+def thread_count(features: str, software: bool, parts: int = 0) -> int:
     """Invocations per block: what suits the renderer, halved until their triangles fit into shared memory."""
     count = layout(features)["FEATURES"]
     threads = SOFTWARE_THREADS if software else HARDWARE_THREADS
-    while threads > 1 and shared_bytes(count, threads) > SHARED_MEMORY:
+    while threads > 1 and shared_bytes(count, threads, parts) > SHARED_MEMORY:
         threads //= 2
     return threads
 
 
-def shared_bytes(features: int, threads: int) -> int:
-    """Shared memory of ``bmfr/fit.comp``: half of the triangles, the bounds of position, the weights."""
-    triangles = features * (features + 7) // 2 * max(threads // 2, 1)
-    return 4 * triangles + 2 * 16 * threads + 16 * features
+def shared_bytes(features: int, threads: int, parts: int = 0) -> int:
+    """Shared memory of ``bmfr/fit.comp``: half of the triangles and all of the parts', bounds of position, weights."""
+    slots = max(threads // 2, 1) + parts
+    triangle = features * (features + 7) // 2 + (1 if parts else 0)
+    return 4 * triangle * slots + 2 * 16 * threads + 16 * features * (1 + parts)
 
 
 def bmfr(g: Graph, direct: Tex, indirect: Tex, albedo: Tex, guides: Guides, p: Bmfr, view: View) -> Tex:

@@ -18,7 +18,7 @@ MODES = ("noise", "rank", "both")
 
 
 def config(**changes: object) -> Config:
-    return Config(bmfr=replace(Bmfr(block=32), **changes), taa=Taa(enabled=False))  # type: ignore[arg-type]
+    return Config(bmfr=replace(Bmfr(block=32, part=0), **changes), taa=Taa(enabled=False))  # type: ignore[arg-type]
 
 
 def run(bench: Bench, packet: FramePacket, index: int = 0, keep: tuple[str, ...] = (), **changes: object) -> Images:

@@ -129,10 +129,43 @@ def fitted(color: F64, usable: Mask, packet: FramePacket, p: Bmfr) -> F64:
         noise[:, 0] = 0.0
         seen = features + (0 if p.regularization == "rank" else noise)
         kept = independent(seen[counts], 1e-7 if p.regularization == "noise" else p.rank_tolerance)
-        weights = np.linalg.lstsq(seen[counts][:, kept], color[at][counts])[0]
-        fit = np.where(hit[:, None], np.maximum(features[:, kept] @ weights, 0.0), 0.0)
+        weights = np.zeros((features.shape[1], 3))
+        weights[kept] = np.linalg.lstsq(seen[counts][:, kept], color[at][counts])[0]
+        fit = features @ weights
+        for part in parts_of(p):
+            own = counts[part]
+            extra = refit(seen[part][own], color[at][part][own] - seen[part][own] @ weights, p)
+            fit[part] = features[part] @ (weights + extra)
+        fit = np.where(hit[:, None], np.maximum(fit, 0.0), 0.0)
         result[y[inside], x[inside]] = fit[inside]
     return result
+
+
+def parts_of(p: Bmfr) -> list[I64]:
+    """For each part of a block its elements, which count along x first."""
+    if not p.part:
+        return []
+    y, x = np.mgrid[: p.block, : p.block].reshape(2, -1) // p.part
+    number = y * (p.block // p.part) + x
+    return [np.flatnonzero(number == part) for part in range(number.max() + 1)]
+
+
+def refit(features: F64, rest: F64, p: Bmfr) -> F64:
+    """(M, 3) weights that a part adds to the block's; ``features`` (pixels, M) and what is left of its colours there.
+
+    The part's own least squares, shrunk by 1 - caution / F, where F = (explained / M) / (unexplained / (pixels - M)) over
+    all channels: caution 1 takes away what noise alone is expected to explain.
+    """
+    extra = np.zeros((features.shape[1], 3))
+    kept = independent(features, 0.0 if p.regularization != "rank" else p.rank_tolerance) if len(features) else []
+    freedom = len(features) - len(kept)
+    if freedom <= len(kept):
+        return extra
+    own = np.linalg.lstsq(features[:, kept], rest)[0]
+    explained, unexplained = ((features[:, kept] @ own) ** 2).sum(), ((rest - features[:, kept] @ own) ** 2).sum()
+    if explained > 0.0:
+        extra[kept] = own * max(1.0 - p.caution * (len(kept) / explained) * (unexplained / freedom), 0.0)
+    return extra
 
 
 def independent(features: F64, tolerance: float) -> list[int]:

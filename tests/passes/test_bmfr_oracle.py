@@ -25,11 +25,17 @@ FRAMES = 6
         load(None, ("bmfr.preset=paper",)).bmfr,
         load(None, ("bmfr.preset=reference",)).bmfr,
         Bmfr(),
-        Bmfr(regularization="both", block=16, alpha=0.0, alpha_fit=0.0),
-        Bmfr(features="1,depth,w,albedo,n,w3", regularization="noise", noise=0.1, position_tolerance=1.5),
-        Bmfr(features="1", regularization="rank", block=8, normal_tolerance=0.001, max_history=10),
+        Bmfr(part=8),
+        Bmfr(part=8, caution=0.0),
+        Bmfr(part=12, block=24, features="1,w", regularization="rank"),
+        Bmfr(part=0, regularization="both", block=16, alpha=0.0, alpha_fit=0.0),
+        Bmfr(part=0, features="1,depth,w,albedo,n,w3", regularization="noise", noise=0.1, position_tolerance=1.5),
+        Bmfr(part=0, features="1", regularization="rank", block=8, normal_tolerance=0.001, max_history=10),
     ],
-    ids=["paper", "reference", "best", "small blocks", "other features", "mean of a block"],
+    ids=[
+        *("paper", "reference", "best", "quarters", "without doubt", "rank test of halves"),
+        *("small blocks", "other features", "mean of a block"),
+    ],
 )
 def test_every_frame_agrees_with_double_precision(bench: Bench, p: Bmfr) -> None:
     """With the same roundings to half precision only those values differ that fall on the other side of a rounding."""
@@ -46,7 +52,7 @@ def test_every_frame_agrees_with_double_precision(bench: Bench, p: Bmfr) -> None
 @pytest.mark.parametrize("size", [(1, 1), (1, 9), (9, 1), (20, 3), (31, 33)])
 def test_pictures_smaller_than_a_block_agree(bench: Bench, size: tuple[int, int]) -> None:
     """They go on as their mirror image once, and as their last pixels from there on."""
-    p = Bmfr(block=32, features="1")
+    p = Bmfr(block=32, part=0, features="1")
     packet = room(0, size)
     radiance = bench.denoise(packet, Config(bmfr=p, taa=Taa(enabled=False)), "bmfr")["radiance"][..., :3]
     assert difference(radiance, Oracle(p, to_half).step(packet), packet).max(initial=0.0) < 2 * HALF
@@ -54,7 +60,7 @@ def test_pictures_smaller_than_a_block_agree(bench: Bench, size: tuple[int, int]
 
 def test_camera_rays_may_pass_anywhere_in_their_pixel(bench: Bench) -> None:
     """Positions follow the jitter, of which the fit of a slanted wall takes notice."""
-    p = Bmfr(regularization="rank", features="1,w3")
+    p = Bmfr(part=0, regularization="rank", features="1,w3")
     packet = replace(room(3, SIZE), jitter=(0.45, -0.4))
     config = Config(bmfr=p, taa=Taa(enabled=False))
     radiance = bench.denoise(packet, config, "bmfr")["radiance"][..., :3]

@@ -217,3 +217,35 @@ def test_the_terminal_is_told_once_that_kernels_are_compiled(capfd):
     terminal.compiling("second")
     assert isinstance(terminal.stage("reading"), Progress)
     assert capfd.readouterr() == ("", "compiling the tracer's kernels, once for each kind of scene ...\n")
+
+
+@pytest.mark.parametrize("cancelled", [True, False])
+def test_what_an_opening_had_made_is_freed_when_it_ends_early(
+    config: Config, monkeypatch: pytest.MonkeyPatch, cancelled: bool
+) -> None:
+    class Part:
+        """Of a scene."""
+
+    made: list[weakref.ref[Part]] = []
+    begun, go_on = threading.Event(), threading.Event()
+
+    def half_a_scene(*arguments: Any, log: Opening) -> None:
+        part = Part()
+        made.append(weakref.ref(part))
+        begun.set()
+        assert go_on.wait(SECONDS)
+        with log.stage("the other half"):
+            raise UserError("not in this file")
+
+    monkeypatch.setattr("ui.opening.open_shot", half_a_scene)
+    opening = Opening("half", config, None, True)
+    assert begun.wait(SECONDS)
+    if cancelled:
+        opening.close()
+    go_on.set()
+    opening._thread.join()
+    if not cancelled:
+        with pytest.raises(UserError, match="not in this file") as caught:
+            opening.result()
+        del caught
+    assert [part() for part in made] == [None], "without a collector, which is told to leave it alone"

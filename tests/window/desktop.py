@@ -43,7 +43,7 @@ def require_tools() -> None:
         pytest.skip("this Pillow cannot read an X screen (built without XCB)")
 
 
-def wait_for(condition: Callable[[], T], what: str, seconds: float = SECONDS) -> T:
+def wait_for(condition: Callable[[], T | None], what: str, seconds: float = SECONDS) -> T:
     """The first true value of ``condition``; fails the test if there is none in time."""
     end = time.monotonic() + seconds
     while True:
@@ -200,7 +200,8 @@ class App:
 
     def passes(self) -> list[str]:
         """The passes of the frame shown, as ``--log`` last told them."""
-        return re.findall(r"pass(?:es)?: (.*)", self.stdout())[-1].split()
+        last: str = re.findall(r"pass(?:es)?: (.*)", self.stdout())[-1]
+        return last.split()
 
     def await_passes(self, expected: list[str]) -> None:
         """Until frames run through exactly these passes, which may have to be compiled first."""

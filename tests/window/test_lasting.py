@@ -21,7 +21,7 @@ pytestmark = pytest.mark.window
 SIZE = 64, 36
 HALF = 250  # keys
 BURST = 25  # keys, after which the program is given the time to hear them all
-GROWTH = 40.0  # MB
+GROWTH = 40.0  # MB; measured: 17 from the first half to the second, 7 and 5 in further ones
 
 X_NAMES = {
     "TAB": "Tab",
@@ -96,7 +96,12 @@ class Player:
 
 
 @pytest.mark.slow
-def test_five_hundred_keys_at_random_leave_nothing_behind(display: str, tmp_path: Path) -> None:
+def test_five_hundred_keys_at_random_leave_nothing_behind(
+    display: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # glibc gives threads heaps of their own, and what was freed in them rarely back: 200 MB that are no leak.
+    monkeypatch.setenv("MALLOC_ARENA_MAX", "1")
+    monkeypatch.setenv("MALLOC_TRIM_THRESHOLD_", "1000000")
     with application(display, tmp_path, "--no-animate", size="{}x{}".format(*SIZE)) as app:
         app.await_passes(plan("svgf"))
         fresh = app.settled()
@@ -107,7 +112,6 @@ def test_five_hundred_keys_at_random_leave_nothing_behind(display: str, tmp_path
             app.await_passes(plan("svgf"))
             assert difference(fresh, app.settled()) < 2 * STILL, "the picture of the beginning"
             memory.append(app.megabytes())
-        print("MB:", memory)
         assert memory[1] - memory[0] < GROWTH
         app.press("Escape")
         assert app.process.wait(10.0) == 0

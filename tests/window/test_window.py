@@ -11,6 +11,7 @@ import pytest
 
 from tests.window.desktop import (
     SECONDS,
+    START_SECONDS,
     STILL,
     App,
     application,
@@ -197,6 +198,26 @@ def test_closing_releases_everything_and_the_window_opens_again(display: str, tm
         assert app.stdout().count("left: ['MainThread']") == 2
         assert "Traceback" not in app.stderr()
         assert not re.search("glfw|Warning", app.stderr())
+
+
+REFUSED = """
+import ctypes, sys
+from pathlib import Path
+import config, glfw
+from ui import window
+def loop(viewer):
+    no_capability = 0xFFFF
+    ctypes.CFUNCTYPE(None, ctypes.c_uint)(glfw.get_proc_address("glEnable"))(no_capability)
+window.Viewer.loop = loop
+settings = config.load(None, ["render.width=64", "render.height=36"])
+window.run(settings, window.Wishes("cornell", "none", "still", False, Path(sys.argv[1]), hud=False, calibrate=False))
+"""
+
+
+def test_what_opengl_refused_is_told_at_the_end(display: str, tmp_path) -> None:
+    with running(display, tmp_path, "-c", REFUSED, str(tmp_path / "out")) as app:
+        assert app.process.wait(START_SECONDS) == 0, app.stderr()
+        assert app.stderr().startswith("OpenGL reports GL_INVALID_ENUM")
 
 
 def fails(display: str, tmp_path, *flags: str) -> str:

@@ -1,12 +1,14 @@
 // Fit every block of the noisy picture by noise-free features. Koskela et al. 2019, feature fitting.
 //
 // One work group per block of GROUP_X x GROUP_Y pixels. X_AT: place of feature X's first component in a row; what is not
-// in the list of features is neither computed nor read. NOISE: stochastic regularisation. UNIT: scale to [0, 1].
+// in the list of features is neither computed nor read. NOISE: stochastic regularisation. UNIT: scale to [0, 1]. PARTS: of
+// the block, PART pixels wide, that are fitted again; not defined if there are none.
 
 layout(local_size_x = THREADS) in;
 
 #include "common/finite.glsl"
 #include "bmfr/solver.glsl"
+#include "bmfr/parts.glsl"
 
 uniform sampler2D in_color;   // rgb: accumulated irradiance, finite; a: samples in it, 0: none
 uniform sampler2D in_surface; // normal, depth
@@ -19,12 +21,23 @@ uniform ivec2 u_offset;
 uniform uint u_seed;
 uniform float u_noise;
 uniform float u_rank_tolerance;
+uniform float u_caution;
 
 layout(rgba16f, binding = 0) writeonly uniform image2D out_color;
 
 #define HAS_POSITION (W_AT + W2_AT + W3_AT + DEPTH_AT > -4)
 
 const int PIXELS = GROUP_X * GROUP_Y;
+
+// What the invocations share out among them: the block's parts, or the block as a single piece.
+#if PARTS
+const ivec2 PIECE = ivec2(PART);
+#else
+const ivec2 PIECE = ivec2(GROUP_X, GROUP_Y);
+#endif
+const int PIECES = max(PARTS, 1);
+const int PIECE_PIXELS = PIECE.x * PIECE.y;
+const int SHARING = max(THREADS / PIECES, 1); // invocations that work on the same piece
 
 shared vec4 s_low[THREADS], s_high[THREADS];
 
@@ -34,6 +47,13 @@ vec4 origin, scale;
 vec3 middle_normal, middle_albedo;
 
 ivec2 pixel_of(int element) { return corner + ivec2(element % GROUP_X, element / GROUP_X); }
+
+// Element of the block that is the `i`-th of a piece.
+int element_of(int piece, int i) {
+    const int across = GROUP_X / PIECE.x;
+    ivec2 at = ivec2(piece % across, piece / across) * PIECE + ivec2(i % PIECE.x, i / PIECE.x);
+    return at.y * GROUP_X + at.x;
+}
 
 // The picture goes on as its mirror image. The clamp is for pictures smaller than a block.
 ivec2 mirrored(ivec2 p) {
@@ -129,37 +149,50 @@ void add_noise(const int k) {
 
 #define SELECT(k) row[k] = counts ? row[k] : 0.0;
 
-void fold_block(int thread) {
-    clear_triangle();
-    uint block = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
-    uint seed = hash(u_seed) + block * uint(PIXELS);
-    for (int i = thread; i < PIXELS; i += THREADS) {
-        ivec2 p = mirrored(pixel_of(i));
-        vec4 surface = texelFetch(in_surface, p, 0);
-        vec4 color = texelFetch(in_color, p, 0);
-        vec4 place = place_of(p, surface);
-        write_features(p, surface, place);
-        row[FEATURES] = color.r, row[FEATURES + 1] = color.g, row[FEATURES + 2] = color.b;
+void fold_pixel(int element, uint seed) {
+    ivec2 p = mirrored(pixel_of(element));
+    vec4 surface = texelFetch(in_surface, p, 0);
+    vec4 color = texelFetch(in_color, p, 0);
+    vec4 place = place_of(p, surface);
+    write_features(p, surface, place);
+    row[FEATURES] = color.r, row[FEATURES + 1] = color.g, row[FEATURES + 2] = color.b;
 #if NOISE
-        state = hash(seed + uint(i));
-        EACH(ADD_NOISE)
+    state = hash(seed + uint(element));
+    EACH(ADD_NOISE)
 #endif
-        // Select, do not multiply: a row of zeros changes nothing, 0 · NaN would change everything.
-        bool counts = is_surface(surface, place) && color.a > 0.0;
-        EACH(SELECT)
-        for (int k = FEATURES; k < COLUMNS; ++k) row[k] = counts ? row[k] : 0.0;
-        fold_row();
-    }
+    // Select, do not multiply: a row of zeros changes nothing, 0 · NaN would change everything.
+    bool counts = is_surface(surface, place) && color.a > 0.0;
+    EACH(SELECT)
+    for (int k = FEATURES; k < COLUMNS; ++k) row[k] = counts ? row[k] : 0.0;
+    fold_row();
 }
 
-#define LOAD_WEIGHT(k) weights[k] = s_weights[k];
-#define ADD_FEATURE(k) fit += row[k] * weights[k];
+// Each part has a triangle of its own, which it leaves in shared memory; those of an invocation's parts are folded
+// together for the block's. Where several invocations share a part, merge_triangles() comes past its triangle.
+void fold_block(int thread) {
+    uint block = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
+    uint seed = hash(u_seed) + block * uint(PIXELS);
+    for (int piece = thread % PIECES; piece < PIECES; piece += THREADS) {
+        clear_triangle();
+        for (int i = thread / PIECES; i < PIECE_PIXELS; i += SHARING) fold_pixel(element_of(piece, i), seed);
+#if THREADS <= PARTS
+        share_triangle(LANES + piece);
+#endif
+    }
+#if THREADS < PARTS
+    for (int piece = thread; piece < PARTS - THREADS; piece += THREADS) fold_triangle(LANES + piece, FEATURES);
+#endif
+}
 
-void write_block(int thread) {
-    vec3 weights[FEATURES];
+#define LOAD_WEIGHT(k) piece_weights[k] = s_weights[first + k];
+#define ADD_FEATURE(k) fit += row[k] * piece_weights[k];
+
+void write_piece(int piece, int start) {
+    int first = PARTS > 0 ? FEATURES * (1 + piece) : 0;
+    vec3 piece_weights[FEATURES];
     EACH(LOAD_WEIGHT)
-    for (int i = thread; i < PIXELS; i += THREADS) {
-        ivec2 p = pixel_of(i);
+    for (int i = start; i < PIECE_PIXELS; i += SHARING) {
+        ivec2 p = pixel_of(element_of(piece, i));
         bool inside = all(lessThan(uvec2(p), uvec2(size)));
         vec4 surface = texelFetch(in_surface, mirrored(p), 0);
         vec4 color = texelFetch(in_color, mirrored(p), 0);
@@ -194,5 +227,9 @@ void main() {
     merge_triangles(thread);
     if (thread == 0) solve(u_rank_tolerance);
     barrier();
-    write_block(thread);
+#if PARTS
+    for (int part = thread; part < PARTS; part += THREADS) solve_part(part, u_rank_tolerance, u_caution);
+    barrier();
+#endif
+    for (int piece = thread % PIECES; piece < PIECES; piece += THREADS) write_piece(piece, thread / PIECES);
 }
