@@ -134,7 +134,7 @@ class Bmfr(Section):
         16,
         0,
         32,
-        "[0;32] side of the parts that are fitted again around the block's fit: a half or a quarter of block; 0: none",
+        "[0;32] side of the parts that are fitted again: what of half or a quarter of the block is nearer; 0: none",
         structural=True,
     )
     caution: float = param(
@@ -159,10 +159,12 @@ class Bmfr(Section):
             raise UserError(f'[bmfr] features: must begin with the constant, "1", not {names[0]!r}')
         if "roughness" in names:
             raise UserError("[bmfr] features: frames have no roughness yet, every surface is diffuse")
-        if self.part and self.part * 2 != self.block and self.part * 4 != self.block:
-            fitting = [side // n for side, n in ((self.block, 2), (self.block, 4)) if side % n == 0]
-            known = " or ".join(str(side) for side in [0, *fitting])
-            raise UserError(f"[bmfr] part: with blocks of {self.block} pixels must be {known}, not {self.part}")
+
+    @property
+    def part_side(self) -> int:
+        """``part`` as far as the block can be cut so: the nearer of its half and its quarter, 0 if there are none."""
+        sides = [self.block // n for n in (2, 4) if self.block % n == 0]
+        return min(sides, key=lambda side: abs(side - self.part), default=0) if self.part else 0
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,9 @@ PICTURE: Final = ""
 """``State.view`` while the picture itself is looked at."""
 
 
+_AND: Final = " · "
+
+
 @dataclass
 class TextureLook:
     """How the texture viewer shows a texture.
@@ -131,8 +134,20 @@ class State:
             self.config = dataclasses.replace(self.config, **{section: group})
         self.news = f"{name} = {str(value).lower() if isinstance(value, bool) else value}"
 
+    def tell(self, text: str) -> None:
+        """Add to ``news``, so that what else was done in this frame is told as well, unless it was very much."""
+        told = self.news.split(_AND)[-2:] if self.news else []
+        self.news = _AND.join([*told, text])
+
     def perform(self, binding: Binding) -> None:
         """Do what pressing the key of ``binding`` stands for. Flying goes on while keys are held, so not here."""
+        told, self.news = self.news, ""
+        self._perform(binding)
+        done, self.news = self.news, told
+        if done:
+            self.tell(done)
+
+    def _perform(self, binding: Binding) -> None:
         match binding.action:
             case Action.SHOW:
                 self.show(binding.value)

@@ -248,7 +248,7 @@ class Viewer:
     def _resize(self, size: Size) -> None:
         if size != self._size:
             self._size = size
-            self.state.news = f"{size[0]}x{size[1]} pixels"
+            self.state.tell(f"{size[0]}x{size[1]} pixels")
             self._pace.clear()
 
     def _begin(self) -> None:

@@ -13,8 +13,8 @@ Deviations from the paper:
   given in widths of a pixel, so that it suits every scene.
 * Where the sky is seen, and where there is no finite sample, a pixel takes no part in the fit.
 * A rank test can take the place of the noise, or go along with it.
-* Each part of a block may be fitted again around the block's fit, shrunk by its uncertainty (``bmfr/parts.glsl``). Light
-  that no polynomial expresses over 32 pixels is most of the paper's error.
+* Each part of a block may be fitted again around the block's fit, shrunk by its uncertainty (``bmfr/parts.glsl``):
+  light that no polynomial expresses over 32 pixels is most of the paper's error.
 """
 
 from __future__ import annotations
@@ -115,7 +115,7 @@ class Fit(ComputePass):
     u_seed = Uniform("uint", "of the noise, another one for each frame")
     u_noise = Uniform("float", "[0;1] largest noise added to a feature")
     u_rank_tolerance = Uniform("float", "> 0, what of a feature is neglected, root of the mean square over the block")
-    u_caution = Uniform("float", ">= 0, variances that noise is expected to explain in each feature of a part's own fit")
+    u_caution = Uniform("float", ">= 0, variances that noise is expected to explain in a feature of a part")
 
     def __init__(self, p: Bmfr, view: View) -> None:
         shift = OFFSETS[view.index % len(OFFSETS)]
@@ -126,7 +126,7 @@ class Fit(ComputePass):
                 "THREADS": view.threads,
                 "NOISE": int(p.regularization != "rank"),
                 "UNIT": int(p.unit_scale),
-                **({"PARTS": part_count(p), "PART": p.part} if p.part else {}),
+                **({"PARTS": part_count(p), "PART": p.part_side} if p.part_side else {}),
             },
             u_view=view.rows,
             u_jitter=view.jitter,
@@ -167,7 +167,7 @@ def layout(features: str) -> dict[str, int]:
 
 def part_count(p: Bmfr) -> int:
     """Parts of a block that are fitted again; 0 if ``part`` is."""
-    return (p.block // p.part) ** 2 if p.part else 0
+    return (p.block // p.part_side) ** 2 if p.part_side else 0
 
 
 def thread_count(features: str, software: bool, parts: int = 0) -> int:

@@ -143,17 +143,17 @@ def fitted(color: F64, usable: Mask, packet: FramePacket, p: Bmfr) -> F64:
 
 def parts_of(p: Bmfr) -> list[I64]:
     """For each part of a block its elements, which count along x first."""
-    if not p.part:
+    if not p.part_side:
         return []
-    y, x = np.mgrid[: p.block, : p.block].reshape(2, -1) // p.part
-    number = y * (p.block // p.part) + x
+    y, x = np.mgrid[: p.block, : p.block].reshape(2, -1) // p.part_side
+    number = y * (p.block // p.part_side) + x
     return [np.flatnonzero(number == part) for part in range(number.max() + 1)]
 
 
 def refit(features: F64, rest: F64, p: Bmfr) -> F64:
     """(M, 3) weights that a part adds to the block's; ``features`` (pixels, M) and what is left of its colours there.
 
-    The part's own least squares, shrunk by 1 - caution / F, where F = (explained / M) / (unexplained / (pixels - M)) over
+    The part's own least squares, shrunk by 1 - caution / F; F = (explained / M) / (unexplained / (pixels - M)) over
     all channels: caution 1 takes away what noise alone is expected to explain.
     """
     extra = np.zeros((features.shape[1], 3))

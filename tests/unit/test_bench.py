@@ -360,7 +360,7 @@ def test_methods_change_only_what_is_theirs(separate):
 
 
 def test_a_method_with_a_preset_has_all_of_it_and_nothing_of_the_user_s():
-    own = load(None, ["svgf.prefilter=true", "svgf.max_history=20", "svgf.iterations=2", "bmfr.block=9"])
+    own = load(None, ["svgf.prefilter=true", "svgf.max_history=20", "svgf.iterations=2", "bmfr.part=0"])
     for denoiser, preset in product(("svgf", "bmfr"), ("paper", "reference")):
         (method,) = [method for method in METHODS if (method.denoiser, method.preset) == (denoiser, preset)]
         expected = load(None, [f"{denoiser}.preset={preset}"])

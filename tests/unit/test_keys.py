@@ -201,6 +201,14 @@ def test_a_single_step_stops_the_animation():
     assert press(state(), "N").next_scene
 
 
+def test_what_was_done_in_one_frame_is_told_together():
+    s = press(state(), "H", "R")
+    assert s.news == "history reset · camera reset"
+    assert press(s, "SPACE", "W", "SPACE").news == "camera reset · animation stopped · animation goes on"
+    s.tell("64x36 pixels")
+    assert s.news.endswith("goes on · 64x36 pixels")
+
+
 def test_escape_lets_go_of_the_mouse_before_it_quits():
     s = state()
     s.looking = True

@@ -61,8 +61,16 @@ def count_closed(monkeypatch: pytest.MonkeyPatch) -> list[Tracer]:
 
 
 def test_a_scene_comes_as_if_opened_here_and_nothing_is_printed(config, capfd):
-    lines = []
-    opening = Opening("cornell", config, "still", animate=True, notify=lambda: lines.append(opening.progress))
+    lines: list[str] = []
+    made: list[Opening] = []
+
+    def note() -> None:
+        while not made:  # the thread may be faster than the assignment below
+            time.sleep(0.001)
+        lines.append(made[0].progress)
+
+    opening = Opening("cornell", config, "still", animate=True, notify=note)
+    made.append(opening)
     with opening.result().tracer as tracer:
         opened = session.open_shot("cornell", config, "still", animate=True, log=opening)
         with opened.tracer:
