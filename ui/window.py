@@ -134,10 +134,9 @@ class Viewer:
             packet = None if self.stage.idle else self.stage.take()
             if self.stage.idle:
                 self._begin()
-            if packet is not None:
-                self._filter(packet)
-            if self._result is not None and (packet is not None or self._stale):
-                self._show(self._result)
+            fresh = packet is not None and self._filter(packet)
+            if self._result is not None and (fresh or self._stale):
+                self._show(self._result, fresh)
 
     def release(self) -> None:
         """Free everything but the window, and tell if anything was done that OpenGL refused."""
@@ -256,11 +255,12 @@ class Viewer:
         if self._opening is None or not self._opening.done:
             self.stage.begin(self.state, self._size, self._held)
 
-    def _filter(self, packet: FramePacket) -> None:
+    def _filter(self, packet: FramePacket) -> bool:
+        """Make the next picture of ``packet``; returns whether there is one."""
         result = self._filters.run(packet, self.state)
         if result is None:
             self._stale = True  # for the sake of the progress line
-            return
+            return False
         self._result = result
         now = time.perf_counter()
         interval, self._last = now - self._last, now
@@ -279,9 +279,10 @@ class Viewer:
             status.bad = count_bad(self._result)
         status.errors = [*self._filters.errors, *filter(None, [self._refused])]
         self._log.frame(packet.index, packet.size, self._result.plan, status.errors)
+        return True
 
-    def _show(self, result: Result) -> None:
-        """Draw the last picture, at whatever size the window now has."""
+    def _show(self, result: Result, fresh: bool) -> None:
+        """Draw the last picture, at whatever size the window now has. ``fresh``: it has not been drawn before."""
         state, screen, size = self.state, self.window.ctx.screen, self.window.framebuffer_size
         picture = result.outputs["display"]
         scale = size[0] / max(self.window.size[0], 1)
@@ -295,7 +296,7 @@ class Viewer:
             self._overlay.draw(self.window.size, size, self.window.content_scale, state, self.status)
         self.window.swap()
         self._stale = False
-        if state.screenshot:
+        if state.screenshot and fresh:  # what the keys before it have changed can be seen in it
             state.screenshot = False
             state.news = save_screenshot(self._wishes.out, (read(picture)[..., :3] * 255.0 + 0.5).astype(np.uint8))
         method = f"{state.denoiser}{' + TAA' if state.anti_aliased else ''}"

@@ -79,10 +79,10 @@ def created(*args, **kwargs):
     calls.clear()  # what it takes to be ready for a panel
 window.Viewer.__init__ = created
 show = window.Viewer._show
-def shown(self, result):
+def shown(self, result, fresh):
     print("calls:", "none" if not calls else " ".join(sorted(calls)), flush=True)
     calls.clear()
-    show(self, result)
+    show(self, result, fresh)
 window.Viewer._show = shown
 settings = config.load(None, ["render.width=64", "render.height=36"])
 wishes = window.Wishes("cornell", "svgf", "still", True, Path(sys.argv[1]), hud=False, calibrate=False, log=True)
