@@ -6,8 +6,8 @@ import glfw
 import moderngl
 
 from errors import UserError
-from gl.context import REQUIRED_VERSION
 from gl.unlocked import UnlockedLoader
+from ui.glfw_window import create_hidden
 
 
 class CompilingContext:
@@ -21,17 +21,7 @@ class CompilingContext:
     """
 
     def __init__(self) -> None:
-        glfw.default_window_hints()
-        for hint, value in (
-            (glfw.VISIBLE, glfw.FALSE),
-            (glfw.CONTEXT_VERSION_MAJOR, REQUIRED_VERSION // 100),
-            (glfw.CONTEXT_VERSION_MINOR, REQUIRED_VERSION // 10 % 10),
-            (glfw.OPENGL_PROFILE, glfw.OPENGL_CORE_PROFILE),
-            (glfw.DEPTH_BITS, 0),
-            (glfw.STENCIL_BITS, 0),
-        ):
-            glfw.window_hint(hint, value)
-        self._handle = glfw.create_window(1, 1, "shaders", None, None)
+        self._handle = create_hidden((1, 1), "shaders")
         if not self._handle:
             raise UserError("no second OpenGL context: shaders are compiled between frames")
 

@@ -214,17 +214,7 @@ class Window:
         self._terminate()
 
     def _open(self, title: str, picture: Size) -> Any:  # glfw's type of windows has no public name
-        glfw.default_window_hints()
-        for hint, value in (
-            (glfw.VISIBLE, glfw.FALSE),
-            (glfw.CONTEXT_VERSION_MAJOR, REQUIRED_VERSION // 100),
-            (glfw.CONTEXT_VERSION_MINOR, REQUIRED_VERSION // 10 % 10),
-            (glfw.OPENGL_PROFILE, glfw.OPENGL_CORE_PROFILE),
-            (glfw.DEPTH_BITS, 0),
-            (glfw.STENCIL_BITS, 0),
-        ):
-            glfw.window_hint(hint, value)
-        handle = glfw.create_window(*first_size(picture, _room()), title, None, None)
+        handle = create_hidden(first_size(picture, _room()), title)
         if not handle:
             raise UserError(f"no window with OpenGL 4.3: {self._last_problem()}", _ADVICE)
         return handle
@@ -260,6 +250,21 @@ class Window:
     def _terminate() -> None:
         glfw.terminate()  # destroys the window as well
         glfw.set_error_callback(None)  # type: ignore[arg-type]  # None: glfw's own one
+
+
+def create_hidden(size: Size, title: str) -> Any:
+    """glfw's handle of a window that is not shown, with OpenGL as this program needs it; false if there can be none."""
+    glfw.default_window_hints()
+    for hint, value in (
+        (glfw.VISIBLE, glfw.FALSE),
+        (glfw.CONTEXT_VERSION_MAJOR, REQUIRED_VERSION // 100),
+        (glfw.CONTEXT_VERSION_MINOR, REQUIRED_VERSION // 10 % 10),
+        (glfw.OPENGL_PROFILE, glfw.OPENGL_CORE_PROFILE),
+        (glfw.DEPTH_BITS, 0),
+        (glfw.STENCIL_BITS, 0),
+    ):
+        glfw.window_hint(hint, value)
+    return glfw.create_window(*size, title, None, None)
 
 
 def _room() -> Size:

@@ -116,7 +116,7 @@ class Opening:
             with _one_at_a_time, _no_full_collections():
                 outcome = open_shot(*self._arguments, log=self)
         except _ClosedError:
-            pass
+            pass  # raised by _tell: close() was called, so nobody will ask for an outcome
         except BaseException as error:  # whatever it is, it is raised where the shot is waited for
             outcome = error
         with self._guard:
