@@ -62,6 +62,14 @@ def run(argv: Sequence[str]) -> int:
         from bench import command
 
         command.run(config, tuple(args.scene or ("cornell", "interior")), args.quick, args.out)
+    elif args.command == "record":
+        from bench.recording import record
+
+        record.run(record.RecordJob.of(args, config), config)
+    elif args.command == "replay":
+        from bench.recording import replay
+
+        replay.run(replay.ReplayJob.of(args), config)
     elif has_display():
         from ui import window
 

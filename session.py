@@ -102,11 +102,18 @@ def open_tracer(
 
 
 def open_shot(
-    name: str, config: Config, camera: str | None, animate: bool, jitter: bool = False, log: Log | None = None
+    name: str,
+    config: Config,
+    camera: str | None,
+    animate: bool,
+    jitter: bool = False,
+    log: Log | None = None,
+    positions: bool = False,
 ) -> Shot:
     """Everything between a scene's name and its frames. Progress and the loader's notices go to ``log``, or to stderr.
 
     ``camera``: "still", "flight", the path of a camera path in JSON, or None for the flight if the scene has one.
+    ``positions``: frames carry world positions.
     Raises UserError for a scene or camera that cannot be had, and for a picture that memory has no room for.
     """
     log = log or Terminal()
@@ -122,7 +129,7 @@ def open_shot(
         raise UserError(
             f"--camera flight: {scene.name} has no flight", "use --camera still, or a camera path: --camera path.json"
         )
-    compiled, tracer = open_tracer(scene, config, log=log)
+    compiled, tracer = open_tracer(scene, config, positions, log)
     return Shot(compiled, tracer, size, path, animate, jitter)
 
 
