@@ -10,7 +10,8 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 
-from tests.window.desktop import F32, STILL, App, application, difference, plan, roughness, wait_for
+import assets
+from tests.window.desktop import F32, START_SECONDS, STILL, App, application, difference, plan, roughness, wait_for
 from ui.keys import BINDINGS, Binding
 
 pytestmark = pytest.mark.window
@@ -161,10 +162,13 @@ def single_step(app: App) -> None:
 
 
 def next_scene(app: App) -> None:
-    frames = app.ask("n", r"^frame (\d+): ")
-    app.hear("opened interior", frames.end(), 120.0)
-    app.ask("n", "opened cornell")
-    app.await_title(r"· cornell · svgf")
+    """The second scene, and round all others back to the first."""
+    first, second, *_ = assets.SCENES
+    heard = app.ask("n", f"opening {second}")
+    app.hear(f"opened {second}", heard.end(), START_SECONDS)
+    app.await_title(f"· {second} · svgf")
+    app.go_to_scene(first)
+    app.await_title(f"· {first} · svgf")
 
 
 def camera_home(app: App) -> None:
