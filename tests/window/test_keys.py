@@ -342,6 +342,16 @@ def test_every_key_does_what_the_table_says(app: App, binding: Binding) -> None:
     CHECKS[binding.key](app)
 
 
+def test_the_stages_of_bmfr_are_on_keys_too(app: App) -> None:
+    app.press("2")
+    app.await_passes(plan("bmfr"))
+    for key, setting in {"F1": "bmfr.temporal", "F3": "bmfr.fit", "F4": "bmfr.demodulate"}.items():
+        for value in ("false", "true"):
+            app.ask(key, f": {setting} = {value}$")
+            app.await_passes(plan("bmfr", f"{setting}={value}"))
+    app.press("1")
+
+
 def test_every_check_is_of_a_key_there_is() -> None:
     assert list(CHECKS) == [binding.key for binding in BINDINGS]
 
