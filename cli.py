@@ -14,7 +14,11 @@ from typing import Any, NoReturn
 from errors import UserError, did_you_mean
 
 ROOT = Path(__file__).resolve().parent
-DENOISERS = ("none", "accumulate", "svgf", "bmfr", "reference")
+DENOISERS = (
+    *("none", "accumulate", "svgf", "bmfr"),
+    *("gaussian", "bilateral", "joint", "joint-separable", "atrous", "atrous-jitter", "guided"),
+    "reference",
+)
 LARGEST_SIDE = 16384
 SCENE_FILES = ".glb .gltf .obj .ply"
 

@@ -172,6 +172,77 @@ class Bmfr(Section):
 
 
 @dataclass(frozen=True)
+class Spatial(Section):
+    """What the filters in space have in common: when they blend over time, and the edges that stop them."""
+
+    demodulate: bool = param(True, doc="filter illumination, without the surfaces' albedo", structural=True)
+    temporal: bool = param(True, doc="accumulate over time", structural=True, heading="accumulation")
+    order: str = param(
+        "filter-first",
+        choices=("filter-first", "blend-first"),
+        doc="blend filtered frames over time, or filter what was blended",
+        structural=True,
+    )
+    alpha: float = param(0.1, 0, 1, "[0;1] smallest share of the new frame; 0: running mean")
+    max_history: int = param(255, 10, 255, "[10;255] longest history counted, in frames")
+    depth_tolerance: float = param(0.01, 0, 1, "[0;1] largest depth difference accepted in history, part of the depth")
+    normal_tolerance: float = param(0.9, -1, 1, "[-1;1] smallest cosine between normals accepted in history")
+    sigma_z: float = param(
+        1.0,
+        0.01,
+        100,
+        "[0.01;100] joint, à-trous: tolerance for depth, in depth slopes of the surface",
+        heading="edges",
+    )
+    sigma_n: int = param(128, 1, 1024, "[1;1024] joint, à-trous: exponent of the cosine between normals; more: sharper")
+
+
+@dataclass(frozen=True)
+class Gaussian(Section):
+    """Gaussian blur, which knows no edges."""
+
+    sigma_d: float = param(2.0, 0.5, 8, "[0.5;8] width, in pixels: standard deviation")
+    separable: bool = param(True, doc="rows, then columns: the same picture for fewer taps", structural=True)
+
+
+@dataclass(frozen=True)
+class Bilateral(Section):
+    """Bilateral filter (Tomasi and Manduchi 1998)."""
+
+    sigma_d: float = param(3.0, 0.5, 8, "[0.5;8] width, in pixels: standard deviation")
+    sigma_r: float = param(1.0, 0.001, 1000, "[0.001;1000] tolerance for colour, in radiance of a white surface")
+
+
+@dataclass(frozen=True)
+class Joint(Section):
+    """Joint bilateral filter (Petschnigg et al. 2004, Eisemann and Durand 2004), whole or approximated separably."""
+
+    sigma_d: float = param(4.0, 0.5, 8, "[0.5;8] width, in pixels: standard deviation")
+
+
+@dataclass(frozen=True)
+class Atrous(Section):
+    """Edge-avoiding à-trous wavelet with tolerances set by hand (Dammertz et al. 2010), all taps or some of them."""
+
+    iterations: int = param(5, 0, 8, "[0;8] à-trous iterations; number i takes every 2^i-th pixel", structural=True)
+    sigma_l: float = param(
+        1.0, 0.001, 1000, "[0.001;1000] tolerance for luminance in the first iteration, in radiance of a white surface"
+    )
+    halve: bool = param(True, doc="halve the tolerance for luminance in every iteration")
+    taps: int = param(8, 1, 24, "[1;24] atrous-jitter: taps of an iteration besides the centre", structural=True)
+
+
+@dataclass(frozen=True)
+class Guided(Section):
+    """Guided filter (He et al. 2010, Bauszat et al. 2011)."""
+
+    radius: int = param(8, 1, 32, "[1;32] half a window's side, in pixels")
+    epsilon: float = param(
+        0.01, 1e-6, 1, "[1e-06;1] doubt in the guides: variance of a guide below which it says little"
+    )
+
+
+@dataclass(frozen=True)
 class Taa(Section):
     """Temporal anti-aliasing (Karis 2014)."""
 
@@ -208,6 +279,12 @@ class Config:
     firefly: Firefly = field(default_factory=Firefly)
     svgf: Svgf = field(default_factory=Svgf)
     bmfr: Bmfr = field(default_factory=Bmfr)
+    spatial: Spatial = field(default_factory=Spatial)
+    gaussian: Gaussian = field(default_factory=Gaussian)
+    bilateral: Bilateral = field(default_factory=Bilateral)
+    joint: Joint = field(default_factory=Joint)
+    atrous: Atrous = field(default_factory=Atrous)
+    guided: Guided = field(default_factory=Guided)
     taa: Taa = field(default_factory=Taa)
     display: Display = field(default_factory=Display)
 
@@ -217,6 +294,12 @@ SECTIONS: dict[str, type[Section]] = {
     "firefly": Firefly,
     "svgf": Svgf,
     "bmfr": Bmfr,
+    "spatial": Spatial,
+    "gaussian": Gaussian,
+    "bilateral": Bilateral,
+    "joint": Joint,
+    "atrous": Atrous,
+    "guided": Guided,
     "taa": Taa,
     "display": Display,
 }

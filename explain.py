@@ -35,7 +35,8 @@ WORDS: Final = {
 """What the switches of kernels and kinds of scenes mean; one that is not here goes by its own name."""
 
 _FEW: Final = 3
-"""So many readers of an image are named; of more only the number is given."""
+_READERS_WIDTH: Final = 70
+"""So many readers of an image are named, in so many letters; of more only the number is given."""
 
 _WIDTH: Final = 118
 _INDENT: Final = 40  # where the names of textures begin, or later
@@ -261,7 +262,9 @@ def _readers(plan: Plan, image: str) -> str:
     names = [node.name for node in plan.passes if any(tex.name == PREFIX + image for tex in node.reads.values())]
     if not names:
         return "handed on as it is"
-    return f"read by {', '.join(names) if len(names) <= _FEW else f'{len(names)} passes'}"
+    listed = ", ".join(names)
+    short = len(names) <= _FEW and len(listed) <= _READERS_WIDTH
+    return f"read by {listed if short else f'{len(names)} passes'}"
 
 
 def _why_not_made(tracer: Tracer, image: str) -> str:

@@ -15,6 +15,7 @@ from gl.passes.bad_pixels import mark_bad
 from gl.passes.bmfr import View, bmfr, part_count, thread_count
 from gl.passes.exposure import auto_exposure
 from gl.passes.firefly import reject_fireflies
+from gl.passes.spatial import SPATIAL, spatial
 from gl.passes.svgf import svgf
 from gl.passes.taa import taa
 from gl.passes.temporal import Guides, accumulate, reproject
@@ -25,9 +26,26 @@ DENOISERS = {
     "accumulate": "temporal accumulation alone",
     "svgf": "spatiotemporal variance-guided filtering (Schied et al. 2017)",
     "bmfr": "blockwise multi-order feature regression (Koskela et al. 2019)",
+    "gaussian": "Gaussian blur",
+    "bilateral": "bilateral filter (Tomasi and Manduchi 1998)",
+    "joint": "joint bilateral filter on depth and normals (Petschnigg et al. 2004)",
+    "joint-separable": "the same, approximated by rows and columns",
+    "atrous": "à-trous wavelet with edges set by hand (Dammertz et al. 2010)",
+    "atrous-jitter": "the same with fewer taps, drawn at random",
+    "guided": "guided filter on depth and normals (He et al. 2010, Bauszat et al. 2011)",
     "reference": "mean of many paths per pixel of the same frame",
 }
 """Name -> what it is. In the order of the window's keys."""
+
+SECTIONS_OF: dict[str, tuple[str, ...]] = {
+    "none": (),
+    "accumulate": ("svgf",),
+    "svgf": ("svgf",),
+    "bmfr": ("bmfr",),
+    **{denoiser: (denoiser.partition("-")[0], "spatial") for denoiser in SPATIAL},
+    "reference": (),
+}
+"""Denoiser -> the configuration's sections that are its own, that with most of its parameters first."""
 
 
 @dataclass(frozen=True)
@@ -57,6 +75,10 @@ class FrameTraits:
             index=packet.index,
             software=software,
         )
+
+
+Builder = Callable[[Graph, Config, FrameTraits], Tex]
+"""Adds a denoiser to a graph and returns the radiance."""
 
 
 class Signals:
@@ -123,15 +145,30 @@ def _bmfr(g: Graph, config: Config, traits: FrameTraits) -> Tex:
     return g.add(display.Modulate(), in_direct=clean, in_emission=s.emission, **albedo_after).out_radiance
 
 
+def _spatial(denoiser: str) -> Builder:
+    """What builds a filter in space, by its name."""
+
+    def builder(g: Graph, config: Config, traits: FrameTraits) -> Tex:
+        s, demodulate = Signals(g, config), config.spatial.demodulate
+        albedo = {"in_albedo": s.albedo}
+        noisy = {"in_direct": s.direct, "in_indirect": s.indirect, **({} if demodulate else albedo)}
+        clean = spatial(g, denoiser, noisy, Guides(g, traits.moving), config, traits.pixel_size, traits.index)
+        after = albedo if demodulate else {}
+        return g.add(display.Modulate(), in_direct=clean, in_emission=s.emission, **after).out_radiance
+
+    return builder
+
+
 def _reference(g: Graph, config: Config, traits: FrameTraits) -> Tex:
     return g.import_("frame.reference", "rgba32f")
 
 
-_BUILDERS: dict[str, Callable[[Graph, Config, FrameTraits], Tex]] = {
+_BUILDERS: dict[str, Builder] = {
     "none": _none,
     "accumulate": _accumulate,
     "svgf": _svgf,
     "bmfr": _bmfr,
+    **{denoiser: _spatial(denoiser) for denoiser in SPATIAL},
     "reference": _reference,
 }
 

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from config import SECTIONS, Config, apply_preset
 from errors import UserError
-from gl.pipelines import DENOISERS
+from gl.pipelines import DENOISERS, SECTIONS_OF
 from parameter import Param, Value, parameters
 from ui.keys import Action, Binding
 
@@ -84,9 +84,14 @@ class State:
             self.before = "svgf" if self.denoiser == "none" else "none"
 
     @property
+    def sections(self) -> tuple[str, ...]:
+        """The configuration's sections that are the method's own, that with most of its parameters first."""
+        return SECTIONS_OF[self.denoiser]
+
+    @property
     def section(self) -> str:
-        """The configuration's section that the method shown reads; "" if it has none."""
-        return {"accumulate": "svgf"}.get(self.denoiser, self.denoiser if self.denoiser in SECTIONS else "")
+        """The first of them; "" if there are none."""
+        return next(iter(self.sections), "")
 
     @property
     def anti_aliased(self) -> bool:
@@ -108,13 +113,15 @@ class State:
     def parameter(self, name: str) -> tuple[str, Param] | None:
         """Full name, ``section.key``, and metadata of a parameter; None if the method shown has none of that name.
 
-        ``name``: ``section.key``, or a key of the section that belongs to the method shown; of several, ``a/b``, the
-        first that it has.
+        ``name``: ``section.key``, or a key of a section that is the method's own; of several, ``a/b``, the first that it
+        has.
         """
         section, _, keys = name.rpartition(".")
-        section = section or self.section
-        known = parameters(SECTIONS[section]) if section in SECTIONS else {}
-        return next(((f"{section}.{key}", known[key]) for key in keys.split("/") if key in known), None)
+        for place in (section,) if section else self.sections:
+            known = parameters(SECTIONS[place])
+            if found := next((key for key in keys.split("/") if key in known), None):
+                return f"{place}.{found}", known[found]
+        return None
 
     def value(self, name: str) -> Any:
         """Value of the parameter ``section.key``."""

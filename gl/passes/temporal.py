@@ -106,19 +106,24 @@ class AccumulateClamped(Accumulate):
     in_high = In("rgb: largest colour accepted from the history")
 
 
-class TemporalSettings(Protocol):
-    """The parameters of accumulation, which every method's section has."""
+class ReprojectionSettings(Protocol):
+    """The parameters of the search in the last frame."""
 
-    @property
-    def alpha(self) -> float: ...
-    @property
-    def alpha_moments(self) -> float: ...
     @property
     def max_history(self) -> int: ...
     @property
     def depth_tolerance(self) -> float: ...
     @property
     def normal_tolerance(self) -> float: ...
+
+
+class TemporalSettings(ReprojectionSettings, Protocol):
+    """And those of accumulation with moments."""
+
+    @property
+    def alpha(self) -> float: ...
+    @property
+    def alpha_moments(self) -> float: ...
 
 
 class Guides:
@@ -131,7 +136,7 @@ class Guides:
         self.optional = {"in_prev_normal": g.import_("frame.prev_normal", "rgba32f")} if moving else {}
 
 
-def reproject(g: Graph, guides: Guides, name: str, p: TemporalSettings, pixel_size: float) -> Tex:
+def reproject(g: Graph, guides: Guides, name: str, p: ReprojectionSettings, pixel_size: float) -> Tex:
     """Add the reprojection of the frame with its own history, ``name.guide``; returns the ``REPROJECTION`` texture."""
     history = g.history(f"{name}.guide", "rgba32f")
     found = g.add(

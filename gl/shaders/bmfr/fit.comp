@@ -7,6 +7,7 @@
 layout(local_size_x = THREADS) in;
 
 #include "common/finite.glsl"
+#include "common/hash.glsl"
 #include "bmfr/solver.glsl"
 #include "bmfr/parts.glsl"
 
@@ -129,13 +130,6 @@ void write_features(ivec2 p, vec4 surface, vec4 place) {
     albedo = is_finite(albedo) ? albedo - middle_albedo : vec3(0.0);
     row[ALBEDO_AT] = albedo.r, row[ALBEDO_AT + 1] = albedo.g, row[ALBEDO_AT + 2] = albedo.b;
 #endif
-}
-
-// Finalizer of Wellons, "lowbias32".
-uint hash(uint x) {
-    x = (x ^ (x >> 16)) * 0x7feb352du;
-    x = (x ^ (x >> 15)) * 0x846ca68bu;
-    return x ^ (x >> 16);
 }
 
 uint state; // of the noise
