@@ -61,7 +61,7 @@ def run(argv: Sequence[str]) -> int:
     elif args.command == "bench":
         from bench import command
 
-        command.run(config, tuple(args.scene or ("cornell", "interior")), args.quick, args.out)
+        command.run(config, tuple(args.scene or ("cornell", "interior")), args.quick, args.out, args.html)
     elif args.command == "record":
         from bench.recording import record
 

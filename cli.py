@@ -286,13 +286,17 @@ def bench_parser() -> Parser:
     parser = Parser(
         "app.py bench",
         "Measure every denoiser on the same traced frames: time, and error and flicker against references of 1024\n"
-        "paths per pixel; and the tracer's time. Prints tables and writes JSON. References are kept in .cache/: only\n"
-        "the first run takes long.",
-        "examples:\n  app.py bench --quick\n  app.py bench --scene cornell --out out/cornell.json",
+        "paths per pixel; path tracing in the same time; and the tracer's time. Prints tables, writes JSON and CSV.\n"
+        "References are kept in .cache/: only the first run takes long.",
+        "examples:\n  app.py bench --quick\n  app.py bench --html --size 320x180\n"
+        "  app.py bench --scene cornell --out out/cornell.json",
     )
     parser.add_argument("--scene", action="append", metavar="S", help="repeatable (default: cornell and interior)")
     parser.add_argument("--quick", action="store_true", help="small pictures, few samples: does it run, not how fast")
     parser.add_argument("--table", action="store_true", help="print tables: the default, for those who say so")
+    parser.add_argument(
+        "--html", action="store_true", help="also write a page with diagrams and pictures, OUT with suffix .html"
+    )
     _add_size(parser)
     parser.add_argument(
         "--out", type=Path, default=Path("out/bench.json"), metavar="JSON", help="default out/bench.json"
