@@ -14,7 +14,7 @@ from typing import Any, NoReturn
 from errors import UserError, did_you_mean
 
 ROOT = Path(__file__).resolve().parent
-DENOISERS = ("none", "accumulate", "svgf", "bmfr", "reference")
+DENOISERS = ("none", "accumulate", "svgf", "asvgf", "bmfr", "reference")
 LARGEST_SIDE = 16384
 SCENE_FILES = ".glb .gltf .obj .ply"
 
