@@ -15,7 +15,7 @@ from errors import UserError, did_you_mean
 
 ROOT = Path(__file__).resolve().parent
 DENOISERS = (
-    *("none", "accumulate", "svgf", "bmfr"),
+    *("none", "accumulate", "svgf", "asvgf", "bmfr"),
     *("gaussian", "bilateral", "joint", "joint-separable", "atrous", "atrous-jitter", "guided"),
     "reference",
 )

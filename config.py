@@ -108,6 +108,38 @@ class Svgf(Section):
 
 
 @dataclass(frozen=True)
+class Asvgf(Svgf):
+    """Adaptive SVGF (Schied et al. 2018): everything that SVGF has, and temporal gradients that cut its history."""
+
+    preset: str = param(
+        "best", choices=("paper", "reference", "best"), doc="values for the keys of this section that are not set"
+    )
+    remember: str = param(
+        "random",
+        choices=("random", "brightest"),
+        doc="which pixel of 3x3 is shaded again in the next frame",
+        heading="gradients",
+    )
+    gradient_iterations: int = param(
+        5, 1, 8, "[1;8] à-trous iterations that spread the gradients over 3x3 pixels and more", structural=True
+    )
+    gradient_guided: bool = param(True, doc="let luminance steer how gradients are spread", structural=True)
+    gradient_sigma_l: float = param(4.0, 0.01, 1000, "[0.01;1000] tolerance for luminance there, in deviations of it")
+    gain: float = param(1.0, 0, 1000, "[0;1000] share of the history that is void, per relative change of light")
+    follow: bool = param(
+        False, doc="let the history follow the light, by the factor that gradients tell", structural=True
+    )
+    widen: bool = param(False, doc="take the largest such share of 3x3 neighbours", structural=True)
+    cut: str = param(
+        "harmonic",
+        choices=("harmonic", "power"),
+        doc="length left of a history: as the sample's weight implies, or a power of what is not void",
+        structural=True,
+    )
+    power: float = param(10.0, 0, 100, "[0;100] that power")
+
+
+@dataclass(frozen=True)
 class Bmfr(Section):
     """Blockwise multi-order feature regression (Koskela et al. 2019)."""
 
@@ -278,6 +310,7 @@ class Config:
     render: Render = field(default_factory=Render)
     firefly: Firefly = field(default_factory=Firefly)
     svgf: Svgf = field(default_factory=Svgf)
+    asvgf: Asvgf = field(default_factory=Asvgf)
     bmfr: Bmfr = field(default_factory=Bmfr)
     spatial: Spatial = field(default_factory=Spatial)
     gaussian: Gaussian = field(default_factory=Gaussian)
@@ -293,6 +326,7 @@ SECTIONS: dict[str, type[Section]] = {
     "render": Render,
     "firefly": Firefly,
     "svgf": Svgf,
+    "asvgf": Asvgf,
     "bmfr": Bmfr,
     "spatial": Spatial,
     "gaussian": Gaussian,
@@ -377,6 +411,32 @@ PRESETS: dict[str, dict[str, dict[str, Value]]] = {
         # What measured best in error at equal time on flights through both scenes (docs/bmfr.md).
         "best": {"part": 16, "regularization": "both"},
     },
+}
+PRESETS["asvgf"] = {
+    # Schied et al. 2018, on top of their SVGF.
+    "paper": {
+        **PRESETS["svgf"]["paper"],
+        "remember": "random",
+        "gradient_iterations": 5,
+        "gradient_guided": True,
+        "gain": 1.0,
+        "widen": False,
+        "cut": "harmonic",
+    },
+    # The authors' own renderer (q2vkpt), as far as it is A-SVGF.
+    "reference": {
+        **PRESETS["svgf"]["paper"],
+        "separate": False,
+        "alpha": 0.075,
+        "alpha_moments": 0.1,
+        "remember": "random",
+        "gradient_iterations": 5,
+        "gradient_guided": True,
+        "gain": 1.0,
+        "widen": True,
+        "cut": "harmonic",
+    },
+    "best": {**PRESETS["svgf"]["best"], "gain": 1.0},
 }
 """section -> value of its ``preset`` key -> values of the keys it owns. A key set by file or ``--set`` wins over it.
 

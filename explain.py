@@ -13,13 +13,13 @@ from functools import cached_property
 from typing import Final
 
 from config import Config
-from gl.pipelines import DENOISERS, FrameTraits, build
+from gl.pipelines import DENOISERS, FrameTraits, build, remembered
 from gl.plan import Memory, Plan
 from gl.switches import DENOISER, TRAIT, Effect, effects, nearest, reasons, ways
 from gl.upload import PREFIX
 from parameter import Value
 from raytrace.compiled import CompiledScene
-from raytrace.features import compiled_in, content_of, images_of, rays_of
+from raytrace.features import GRADIENT, compiled_in, content_of, images_of, rays_of
 from raytrace.integrator import Tracer
 from raytrace.scene import Scene
 from session import find_scene, prepare_tracer, tell_notices
@@ -62,6 +62,11 @@ class Subject:
         """Those that frames of the tracer will have."""
         pixel = self.scene.scene.camera.pixel_size(self.size[1])
         return FrameTraits(moving="prev_normal" in self.tracer.images, pixel_size=pixel)
+
+    @property
+    def images(self) -> tuple[str, ...]:
+        """Names of the images that frames for the denoiser will have."""
+        return (*self.tracer.images, *([GRADIENT] if remembered(self.config, self.denoiser) else []))
 
     @cached_property
     def plan(self) -> Plan:
@@ -153,14 +158,14 @@ def image_section(subject: Subject) -> list[str]:
     """What the tracer makes of a frame, and what of it is uploaded."""
     plan, tracer = subject.plan, subject.tracer
     uploads = {row.names[0].removeprefix(PREFIX): row for row in plan.memory(subject.size) if row.kind == "import"}
-    known = images_of(type(tracer.variant)(*(True for _ in tracer.variant)), positions=True)
+    known = images_of(type(tracer.variant)(*(True for _ in tracer.variant)), positions=True, gradients=True)
     rows: list[tuple[str, ...]] = []
     for name in dict.fromkeys((*known, *uploads)):
         if name in uploads:
             row = uploads[name]
-            made = "uploaded" if name in tracer.images else "uploaded, given beside the frame"
+            made = "uploaded" if name in subject.images else "uploaded, given beside the frame"
             rows.append((name, f"{row.fmt} {_by(row.size)}", f"{row.bytes:,}", f"{made}; {_readers(plan, name)}"))
-        elif name in tracer.images:
+        elif name in subject.images:
             rows.append((name, "", "0", "made, not uploaded: no pass reads it"))
         else:
             rows.append((name, "", "0", f"not made: {_why_not_made(tracer, name)}"))

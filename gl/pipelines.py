@@ -8,9 +8,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from config import Config, Display
+from config import Config, Display, Svgf
 from gl.graph import Graph, Tex
 from gl.passes import display
+from gl.passes.asvgf import asvgf
 from gl.passes.bad_pixels import mark_bad
 from gl.passes.bmfr import View, bmfr, part_count, thread_count
 from gl.passes.exposure import auto_exposure
@@ -25,6 +26,7 @@ DENOISERS = {
     "none": "the noisy frame, one path per pixel",
     "accumulate": "temporal accumulation alone",
     "svgf": "spatiotemporal variance-guided filtering (Schied et al. 2017)",
+    "asvgf": "adaptive SVGF, which forgets light that has changed (Schied et al. 2018)",
     "bmfr": "blockwise multi-order feature regression (Koskela et al. 2019)",
     "gaussian": "Gaussian blur",
     "bilateral": "bilateral filter (Tomasi and Manduchi 1998)",
@@ -115,7 +117,27 @@ def _accumulate(g: Graph, config: Config, traits: FrameTraits) -> Tex:
 
 
 def _svgf(g: Graph, config: Config, traits: FrameTraits) -> Tex:
-    s, p = Signals(g, config), config.svgf
+    p = config.svgf
+
+    def work(signals: dict[str, Tex], noisy: tuple[Tex, Tex]) -> dict[str, Tex]:
+        return svgf(g, signals, Guides(g, traits.moving), p, traits.pixel_size)
+
+    return _by_signals(g, Signals(g, config), p, work)
+
+
+def _asvgf(g: Graph, config: Config, traits: FrameTraits) -> Tex:
+    p = config.asvgf
+
+    def work(signals: dict[str, Tex], noisy: tuple[Tex, Tex]) -> dict[str, Tex]:
+        return asvgf(g, signals, noisy, Guides(g, traits.moving), p, traits.pixel_size)
+
+    return _by_signals(g, Signals(g, config), p, work)
+
+
+def _by_signals(
+    g: Graph, s: Signals, p: Svgf, work: Callable[[dict[str, Tex], tuple[Tex, Tex]], dict[str, Tex]]
+) -> Tex:
+    """Split the light into the signals that ``p`` wants, let ``work`` filter them, and put them together again."""
     albedo_before = {} if p.demodulate else {"in_albedo": s.albedo}
     albedo_after = {"in_albedo": s.albedo} if p.demodulate else {}
     if p.separate:
@@ -128,7 +150,7 @@ def _svgf(g: Graph, config: Config, traits: FrameTraits) -> Tex:
     else:
         both = g.add(display.Combine(), in_direct=s.direct, in_indirect=s.indirect, **albedo_before).out_color
         signals = {"both": both}
-    clean = list(svgf(g, signals, Guides(g, traits.moving), p, traits.pixel_size).values())
+    clean = list(work(signals, (s.direct, s.indirect)).values())
     second = {"in_indirect": clean[1]} if p.separate else {}
     return g.add(display.Modulate(), in_direct=clean[0], in_emission=s.emission, **second, **albedo_after).out_radiance
 
@@ -167,6 +189,7 @@ _BUILDERS: dict[str, Builder] = {
     "none": _none,
     "accumulate": _accumulate,
     "svgf": _svgf,
+    "asvgf": _asvgf,
     "bmfr": _bmfr,
     **{denoiser: _spatial(denoiser) for denoiser in SPATIAL},
     "reference": _reference,
@@ -199,6 +222,11 @@ def build(config: Config, denoiser: str, traits: FrameTraits, split: bool = Fals
     if split:
         g.output("noisy", _noisy(g, p, exposure))
     return g
+
+
+def remembered(config: Config, denoiser: str) -> str:
+    """Which pixels the tracer is to remember for ``denoiser``: one of :data:`raytrace.gradients.RULES`, "" for none."""
+    return config.asvgf.remember if denoiser == "asvgf" and config.asvgf.temporal else ""
 
 
 def _samples(g: Graph) -> dict[str, Tex]:

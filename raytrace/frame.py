@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,15 +20,26 @@ MISS = -1.0
 """Object id of a pixel whose camera ray leaves the scene."""
 
 
+STRATUM: Final = 3
+"""Side in pixels of the squares that have one temporal gradient each."""
+
+
 @dataclass(frozen=True)
 class FramePacket:
     """One frame at one path per pixel. Row 0 of every image is the bottom row; images are (H, W, C) float32.
 
     With noise:
 
-    ``direct``, ``indirect`` (H, W, 4): rgb = illumination divided by the albedo ("demodulated"), linear; a unused (1).
+    ``direct``, ``indirect`` (H, W, 4): rgb = illumination divided by the albedo ("demodulated"), linear; a unused (1),
+    except in ``direct`` of a frame with temporal gradients: 0 where the sample was carried over from the last frame, 2
+    where it may be carried into the next one.
     Direct holds the light sample of the first hit and light sources hit by the bounce ray, combined by multiple
     importance sampling; indirect is what arrives over one bounce. 0 where the camera ray misses.
+
+    ``temporal_gradient`` (ceil(H / 3), ceil(W / 3), 4): by how much the light has changed since the last frame, one
+    surface point for each 3x3 pixels: luminance of the direct light now minus then, and the larger of the two; the same
+    for indirect light. All 0 where there is none; exactly 0 in the differences where nothing changed. None unless asked
+    for.
 
     Without noise (guides):
 
@@ -63,6 +75,7 @@ class FramePacket:
     prev_normal: F32 | None = None
     position: F32 | None = None
     prev_position: F32 | None = None
+    temporal_gradient: F32 | None = None
     scene: str = ""
     scene_id: int = 0
     cut: bool = False

@@ -24,7 +24,8 @@ from raytrace.camera import Camera
 from raytrace.compiled import OBJECT, CompiledScene
 from raytrace.embree import open_caster
 from raytrace.features import images_of
-from raytrace.frame import FramePacket
+from raytrace.frame import STRATUM, FramePacket
+from raytrace.gradients import Memory, Moment, Reshading
 from raytrace.guides import Outputs, camera_rays, guide_kernel
 from raytrace.kernels import SHADOW_END
 from raytrace.sampling import HALTON, HASH
@@ -138,9 +139,11 @@ class Tracer:
         self._first_hit = kernels.first_hit_kernel(self.variant)
         self._second_hit = kernels.second_hit_kernel(self.variant)
         self._scratch = _Scratch()
+        self._memory = Memory()
         self.threads = self.settings.threads or len(os.sched_getaffinity(0))
         self._pool = ThreadPoolExecutor(self.threads, "trace") if self.threads > 1 else None
-        self._time: tuple[float, float] | None = (0.0, 0.0) if not scene.has_motion else None
+        self._time: tuple[float, float] | None = None
+        self._lamps: tuple[float, float] | None = None
 
     @property
     def kernels(self) -> tuple[Callable[..., object], ...]:
@@ -165,8 +168,14 @@ class Tracer:
         if self.scene.has_motion:
             self.set_time(0.0, 0.0)
 
-    def set_time(self, now: float, previous: float) -> None:
-        """Move what moves to time ``now``; the previous positions are those at ``previous`` (seconds)."""
+    def set_time(self, now: float, previous: float, lamps: float = 1.0) -> None:
+        """Move what moves to time ``now``; the previous positions are those at ``previous`` (seconds).
+
+        Lamps shine as their dimmers are at ``now``, times ``lamps``.
+        """
+        if self._lamps != (now, lamps):
+            self.scene.dim(now, lamps)
+            self._lamps = (now, lamps)
         if self.scene.has_motion and self._time != (now, previous):
             self.scene.move_to(now, previous)
             self.rays.move(self.scene.triangles, self.scene.moving_box())
@@ -239,15 +248,21 @@ class Tracer:
         now: float = 0.0,
         previous: float = 0.0,
         cut: bool = False,
+        remember: str = "",
+        lamps: float = 1.0,
     ) -> FramePacket:
         """Frame ``index`` of the run at one path per pixel, ``size`` = (width, height).
 
         ``now``, ``previous``: times in seconds of this frame and the one before it. ``cut``: the frame does not
-        continue the one before it.
+        continue the one before it. ``remember``: one of :data:`raytrace.gradients.RULES`, for a frame with temporal
+        gradients, that depends on the frame before if that was traced just before it and remembered as well; "" for
+        one without. ``lamps``: share of their light that lamps give.
         """
         start = time.perf_counter()
-        self.set_time(now, previous)
+        self.set_time(now, previous, lamps)
         view, before = self._views(camera, previous_camera, size)
+        moment = Moment(index, now, size, (self.settings.seed, self.settings.generator))
+        reshading = self._reshading(moment, previous, view, camera, cut, remember) if remember else None
         count = size[0] * size[1]
         direct, indirect = np.empty((2, count, 4), np.float32)
         direct[:, 3] = indirect[:, 3] = 1.0
@@ -257,12 +272,39 @@ class Tracer:
             hits, directions = self._camera_hits(view, pixels, whole_rows=True)
             self._write_guides(view, before, pixels, hits, directions, outputs)
             seeds = Seeds(pixels.astype(np.uint32), np.full(len(pixels), index, np.uint32))
-            part = slice(int(pixels[0]), int(pixels[-1]) + 1)
+            first = int(pixels[0])
+            part = slice(first, int(pixels[-1]) + 1)
+            if reshading is not None:
+                reshading.replace(first, hits.triangle, hits.u, hits.v, seeds.pixel, seeds.frame)
             self.shade(hits, seeds, view.eye, direct[part], indirect[part])
+            if reshading is not None:
+                reshading.note(first, hits.triangle, hits.u, hits.v, direct[part], indirect[part])
 
-        embree = self.for_each_tile(tile, size)
+        embree = self.for_each_tile(tile, size, 4 if reshading is None else 4 * STRATUM)
         timings = {"trace": time.perf_counter() - start, "embree": embree}
-        return self._packet(index, now, size, direct, indirect, outputs, cut, camera, timings)
+        packet = self._packet(index, now, size, direct, indirect, outputs, cut, camera, timings)
+        if reshading is None:
+            return packet
+        self._memory.keep(moment, reshading.points)
+        return replace(packet, temporal_gradient=reshading.gradient)
+
+    def _reshading(
+        self, moment: Moment, previous: float, view: View, camera: Camera, cut: bool, rule: str
+    ) -> Reshading:
+        """What carries the points of the last frame into the frame of ``moment``."""
+        return Reshading(
+            self.scene.triangles,
+            self.scene.triangle_info,
+            None if cut else self._memory.recall(moment, previous),
+            moment.index,
+            moment.size,
+            view.eye,
+            view.matrix,
+            view.jitter,
+            camera.pixel_size(moment.size[1]),
+            self.settings.seed,
+            rule == "brightest",
+        )
 
     def reference(
         self,
@@ -307,14 +349,15 @@ class Tracer:
         means = (sums / samples).reshape(2, size[1], size[0], 3)
         return means[0], means[1]
 
-    def for_each_tile(self, work: Callable[[I32], None], size: tuple[int, int]) -> float:
+    def for_each_tile(self, work: Callable[[I32], None], size: tuple[int, int], rows: int = 4) -> float:
         """Run ``work`` on tiles of consecutive pixels; returns seconds inside Embree, averaged over the threads.
 
-        Tiles are whole rows, four or a multiple, so that packets of 4x4 pixels are the same for every tile size.
+        Tiles are whole rows, ``rows`` or a multiple, which is one of four, so that packets of 4x4 pixels are the same
+        for every tile size.
         """
         width, height = size
         count = width * height
-        step = width * 4 * max(1, self.settings.tile // (width * 4))
+        step = width * rows * max(1, self.settings.tile // (width * rows))
         tiles = [np.arange(i, min(i + step, count), dtype=np.int32) for i in range(0, count, step)]
 
         def timed(pixels: I32) -> float:

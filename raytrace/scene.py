@@ -21,6 +21,9 @@ F64 = NDArray[np.float64]
 F32 = NDArray[np.float32]
 I32 = NDArray[np.int32]
 
+Dimmer = Callable[[float], float]
+"""Share of its emission that a material gives, >= 0, as a function of time in seconds."""
+
 Motion = Callable[[float], F64]
 """Rigid object-to-world transform, (4, 4) float64 for column vectors, as a function of time in seconds."""
 
@@ -44,6 +47,7 @@ class Material:
     ``base_color``: linear reflectance in [0, 1], multiplied by ``base_texture`` where there is one.
     ``emission``: radiance of the front face (of both faces where ``double_sided``), W/(m² sr) in the scene's own scale,
     multiplied by ``emission_texture`` where there is one. Textures are indices into :attr:`Scene.textures`, -1 = none.
+    ``dimmer``: what of the emission there is at a time; None: always all of it.
     """
 
     name: str
@@ -52,6 +56,7 @@ class Material:
     emission: tuple[float, float, float] = (0.0, 0.0, 0.0)
     emission_texture: int = -1
     double_sided: bool = False
+    dimmer: Dimmer | None = None
 
     @property
     def emits(self) -> bool:

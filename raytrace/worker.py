@@ -25,6 +25,8 @@ class FrameSource(Protocol):
         now: float,
         previous: float,
         cut: bool,
+        remember: str,
+        lamps: float,
     ) -> FramePacket: ...
 
 
@@ -33,7 +35,8 @@ class Request:
     """What the next frame shows.
 
     ``camera`` is without jitter, which ``jitter`` asks for. ``size``: (width, height) in pixels. ``time``: the scene's,
-    in seconds. ``cut``: the frame does not continue the one before it.
+    in seconds. ``cut``: the frame does not continue the one before it. ``remember``, ``lamps``: as in
+    :meth:`raytrace.integrator.Tracer.frame`.
     """
 
     camera: Camera
@@ -41,6 +44,8 @@ class Request:
     time: float = 0.0
     jitter: bool = False
     cut: bool = False
+    remember: str = ""
+    lamps: float = 1.0
 
 
 class Worker:
@@ -133,7 +138,15 @@ class Worker:
         before = request if cut or last is None else last
         camera = request.camera.with_jitter(jitter_of(self._index)) if request.jitter else request.camera
         packet = self._tracer.frame(
-            self._index, camera, before.camera, request.size, request.time, before.time, cut=cut
+            self._index,
+            camera,
+            before.camera,
+            request.size,
+            request.time,
+            before.time,
+            cut=cut,
+            remember=request.remember,
+            lamps=request.lamps,
         )
         self._index += 1
         self._last = request

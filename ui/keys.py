@@ -61,6 +61,7 @@ BINDINGS: Final = (
     Binding("0", Action.SHOW, "off: one path per pixel as it is", "none"),
     Binding("1", Action.SHOW, "SVGF, spatiotemporal variance-guided filtering", "svgf"),
     Binding("2", Action.SHOW, "BMFR, blockwise multi-order feature regression", "bmfr"),
+    Binding("3", Action.SHOW, "A-SVGF, adaptive SVGF: forgets light that has changed", "asvgf"),
     Binding("TAB", Action.PREVIOUS, "back to the method shown before, and forth again"),
     Binding("P", Action.NEXT, "next preset of the method's parameters", "preset"),
     Binding("F1", Action.NEXT, "accumulation over time on or off", "temporal"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
+from gl.pipelines import remembered
 from raytrace.frame import FramePacket
 from raytrace.shot import FPS, Shot
 from raytrace.worker import Request, Worker
@@ -46,7 +47,8 @@ class Stage:
         camera = self.control.next(held.drain(time.perf_counter()), look)
         if state.animate or state.step or self._frame < 0:
             self._frame, state.step = self._frame + 1, False
-        self._worker.submit(Request(camera, size, self._frame / FPS, state.jitter, cut))
+        remember = remembered(state.config, state.denoiser)
+        self._worker.submit(Request(camera, size, self._frame / FPS, state.jitter, cut, remember))
 
     def take(self) -> FramePacket | None:
         """The frame under way, or None if it is not ready."""

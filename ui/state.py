@@ -113,8 +113,8 @@ class State:
     def parameter(self, name: str) -> tuple[str, Param] | None:
         """Full name, ``section.key``, and metadata of a parameter; None if the method shown has none of that name.
 
-        ``name``: ``section.key``, or a key of a section that is the method's own; of several, ``a/b``, the first that it
-        has.
+        ``name``: ``section.key``, or a key of a section that is the method's own; of several, ``a/b``, the first
+        that it has.
         """
         section, _, keys = name.rpartition(".")
         for place in (section,) if section else self.sections:

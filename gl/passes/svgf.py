@@ -33,9 +33,12 @@ and 1 % more in the Cornell box, where hardly anything is disoccluded. The other
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
+
 from config import Svgf
 from gl.graph import FragmentPass, Graph, In, Out, Tex, Uniform
-from gl.passes.temporal import REPROJECTION, Guides, accumulate, reproject
+from gl.passes.temporal import REPROJECTION, Change, Guides, accumulate, reproject
 
 
 class Variance(FragmentPass):
@@ -85,31 +88,51 @@ class Atrous(FragmentPass):
         )
 
 
-def svgf(g: Graph, signals: dict[str, Tex], guides: Guides, p: Svgf, pixel_size: float) -> dict[str, Tex]:
+def svgf(
+    g: Graph,
+    signals: dict[str, Tex],
+    guides: Guides,
+    p: Svgf,
+    pixel_size: float,
+    method: str = "svgf",
+    changes: Mapping[str, Change] = MappingProxyType({}),
+) -> dict[str, Tex]:
     """Filter each of ``signals`` (noisy irradiance by name, "direct", "indirect" or "both"); returns the clean ones.
+
+    ``method``: whose passes and histories these are. ``changes``: what is known of each signal's change of light.
 
     All of them share one reprojection. Histories are named by the set of signals, so that filtering them together
     after filtering them apart begins with a new history, as it must; and by whether the signals hold the albedo.
     """
-    names = "svgf." + "+".join(signals) + ("" if p.demodulate else ".radiance")
-    with g.scope("svgf"):
+    names = f"{method}." + "+".join(signals) + ("" if p.demodulate else ".radiance")
+    with g.scope(method):
         found = reproject(g, guides, names, p, pixel_size) if p.temporal else None
         clean: dict[str, Tex] = {}
         for signal, noisy in signals.items():
             with g.scope(signal):
-                clean[signal] = _filter_signal(g, f"{names}.{signal}", noisy, found, guides, p, pixel_size)
+                change = changes.get(signal)
+                clean[signal] = _filter_signal(g, f"{names}.{signal}", noisy, found, guides, p, pixel_size, change)
         return clean
 
 
 def _filter_signal(
-    g: Graph, name: str, noisy: Tex, reprojection: Tex | None, guides: Guides, p: Svgf, pixel_size: float
+    g: Graph,
+    name: str,
+    noisy: Tex,
+    reprojection: Tex | None,
+    guides: Guides,
+    p: Svgf,
+    pixel_size: float,
+    change: Change | None,
 ) -> Tex:
     x = noisy
     estimate: dict[str, Tex] = {}
     history = None
     if reprojection is not None:
         history = g.history(name, "rgba16f")
-        x, moments = accumulate(g, x, reprojection, history, p, clamp=p.clamp)
+        x, moments = accumulate(g, x, reprojection, history, p, clamp=p.clamp, change=change)
+        if change is not None:
+            reprojection = moments  # where the length of this signal's own history is
         estimate = {"in_moments": moments, "in_reprojection": reprojection}
     # Without time there is no other variance than the one in space; without guidance by variance there is none at all.
     shape = {"in_surface": guides.surface, "in_gradient": guides.gradient}

@@ -15,6 +15,7 @@ Deviations from the paper:
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Final, Protocol
 
 from gl.graph import FragmentPass, Graph, History, In, Out, Prev, Tex, Uniform
@@ -106,6 +107,35 @@ class AccumulateClamped(Accumulate):
     in_high = In("rgb: largest colour accepted from the history")
 
 
+class AccumulateAdaptive(Accumulate):
+    """The same, but where light has changed the history counts for less (Schied et al. 2018, sec. 4.4).
+
+    Each signal then has a history length of its own, which travels with the moments.
+    """
+
+    in_lambda = In("λ, [0;1] how much of each signal's history is void, one texel for each 3x3 pixels")
+    out_moments = Out(
+        "rgba32f", "xy: first and second moment of luminance; z: part of the length that is left; w: history length N"
+    )
+    u_power = Uniform("float", ">= 0, exponent of what λ leaves of the history's length")
+
+
+class AccumulateAdaptiveClamped(AccumulateAdaptive, AccumulateClamped):
+    """Both: the history's colour is clamped, and counts for less where light has changed."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """What is known of a signal's change of light. ``texture``: λ, the signal's in channel number ``channel``.
+
+    ``power``: the history's length N becomes N (1 - λ)^power; None: the one that goes with the sample's weight.
+    """
+
+    texture: Tex
+    channel: int
+    power: float | None
+
+
 class ReprojectionSettings(Protocol):
     """The parameters of the search in the last frame."""
 
@@ -164,31 +194,49 @@ def accumulate(
     p: TemporalSettings,
     fmt: str = "rgba16f",
     clamp: float | None = None,
+    change: Change | None = None,
 ) -> tuple[Tex, Tex]:
     """Add the accumulation of one signal into ``history``, which the caller feeds; returns colour and moments.
 
     ``clamp``: standard deviations of this frame's colours around a pixel by which the history's colour may differ from
-    their mean; None: by any.
+    their mean; None: by any. ``change``: then the moments have the length of the signal's history with them.
     """
-    moments = g.history(f"{history.name}.moments", "rg32f")
-    bounds: dict[str, Tex] = {}
+    moments = g.history(f"{history.name}.moments", "rg32f" if change is None else "rgba32f")
+    extra: dict[str, Tex] = {}
+    defines: dict[str, int] = {"HALF": int(fmt == "rgba16f")}
+    uniforms: dict[str, float] = {}
     if clamp is not None:
         around = g.add(Neighbourhood(u_sigma=clamp, defines={"RADIUS": CLAMP_RADIUS}), in_color=color)
-        bounds = {"in_low": around.out_low, "in_high": around.out_high}
-    work = AccumulateClamped if bounds else Accumulate
+        extra |= {"in_low": around.out_low, "in_high": around.out_high}
+        defines["CLAMPED"] = 1
+    if change is not None:
+        extra["in_lambda"] = change.texture
+        defines |= {"ADAPTIVE": 1, "SIGNAL": change.channel, "POWER": int(change.power is not None)}
+        uniforms["u_power"] = change.power or 0.0
+    work = _ACCUMULATIONS[clamp is not None, change is not None]
     blended = g.add(
         work(
             u_alpha=p.alpha,
             u_alpha_moments=p.alpha_moments,
             formats={"out_color": fmt},
-            defines={"HALF": int(fmt == "rgba16f")} | ({"CLAMPED": 1} if bounds else {}),
+            defines=defines,
+            **uniforms,
         ),
         "accumulate",
         in_color=color,
         in_reprojection=reprojection,
         prev_color=history,
         prev_moments=moments,
-        **bounds,
+        **extra,
     )
     g.feed(moments, blended.out_moments)
     return blended.out_color, blended.out_moments
+
+
+_ACCUMULATIONS: Final[dict[tuple[bool, bool], type[Accumulate]]] = {
+    (False, False): Accumulate,
+    (True, False): AccumulateClamped,
+    (False, True): AccumulateAdaptive,
+    (True, True): AccumulateAdaptiveClamped,
+}
+"""By whether the colour is clamped and whether light is known to have changed."""

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from config import Config, Display, Firefly, Svgf, Taa, load
+from config import Asvgf, Config, Display, Firefly, Svgf, Taa, load
 from gl.pipelines import DENOISERS, FrameTraits, build
 from gl.plan import Plan, check_no_feedback
 
@@ -19,6 +19,10 @@ PLANS = Path(__file__).parent.parent / "plans"
 
 def svgf(**changes: object) -> Config:
     return Config(svgf=replace(Svgf(), **changes))  # type: ignore[arg-type]
+
+
+def asvgf(**changes: object) -> Config:
+    return Config(asvgf=replace(Asvgf(), **changes))  # type: ignore[arg-type]
 
 
 CASES: dict[str, tuple[Config, str, FrameTraits]] = {
@@ -41,6 +45,12 @@ CASES: dict[str, tuple[Config, str, FrameTraits]] = {
     "svgf_unfiltered_feedback": (svgf(feedback_level=-1), "svgf", FrameTraits()),
     "svgf_late_feedback": (svgf(feedback_level=2), "svgf", FrameTraits()),
     "svgf_without_taa": (replace(Config(), taa=Taa(enabled=False)), "svgf", FrameTraits()),
+    "asvgf": (Config(), "asvgf", FrameTraits()),
+    "asvgf_paper": (load(None, ("asvgf.preset=paper",)), "asvgf", FrameTraits()),
+    "asvgf_reference": (load(None, ("asvgf.preset=reference",)), "asvgf", FrameTraits()),
+    "asvgf_moving": (Config(), "asvgf", FrameTraits(moving=True)),
+    "asvgf_unguided": (asvgf(gradient_guided=False, cut="power", color_clamp=True), "asvgf", FrameTraits()),
+    "asvgf_without_temporal": (asvgf(temporal=False), "asvgf", FrameTraits()),
     "bmfr": (Config(), "bmfr", FrameTraits()),
     "bmfr_paper": (load(None, ("bmfr.preset=paper",)), "bmfr", FrameTraits()),
     "bmfr_reference": (load(None, ("bmfr.preset=reference",)), "bmfr", FrameTraits()),

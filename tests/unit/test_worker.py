@@ -32,6 +32,8 @@ class Call:
     now: float
     previous: float
     cut: bool
+    remember: str
+    lamps: float
 
 
 class FakeTracer:
@@ -83,6 +85,7 @@ def test_motion_leads_to_the_frame_traced_before():
             trace(worker, Request(at(step), SIZE, time))
     assert [(c.camera.position[0], c.previous_camera.position[0]) for c in tracer.calls] == [(0, 0), (1, 0), (7, 1)]
     assert [(c.now, c.previous) for c in tracer.calls] == [(2.0, 2.0), (2.25, 2.0), (3.0, 2.25)]
+    assert {(c.remember, c.lamps) for c in tracer.calls} == {("", 1.0)}
 
 
 def test_the_first_frame_is_a_cut_and_so_are_one_of_another_size_and_one_that_is_asked_to_be():
