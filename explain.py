@@ -30,6 +30,7 @@ WORDS: Final = {
     "sky": "a sky",
     "has_sky": "a sky",
     "moving": "moving objects",
+    "lamps": "lamps",
     "positions": "world positions",
 }
 """What the switches of kernels and kinds of scenes mean; one that is not here goes by its own name."""

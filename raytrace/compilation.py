@@ -23,6 +23,7 @@ SOURCES = (
     "embree_run",
     "guides",
     "kernels",
+    "lights",
     "sampling",
     "tables",
     "textures",

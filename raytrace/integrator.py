@@ -26,7 +26,7 @@ from raytrace.embree import open_caster
 from raytrace.features import images_of
 from raytrace.frame import FramePacket
 from raytrace.guides import Outputs, camera_rays, guide_kernel
-from raytrace.kernels import SHADOW_END
+from raytrace.lights import SHADOW_END
 from raytrace.sampling import HALTON, HASH
 from raytrace.tables import Variant, tables_of, variant_of
 

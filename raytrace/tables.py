@@ -49,6 +49,8 @@ class Variant(NamedTuple):
     textured: bool
     sky: bool
     moving: bool
+    lamps: bool = True
+    """Triangles that emit."""
 
 
 def tables_of(scene: CompiledScene) -> Tables:
@@ -77,7 +79,12 @@ def tables_of(scene: CompiledScene) -> Tables:
 
 
 def variant_of(scene: CompiledScene) -> Variant:
-    return Variant(scene.has_textures, scene.lights.has_sky, scene.has_motion)
+    return Variant(
+        textured=scene.has_textures,
+        sky=scene.lights.has_sky,
+        moving=scene.has_motion,
+        lamps=len(scene.lights.triangles) > 0,
+    )
 
 
 @device

@@ -32,7 +32,7 @@ SCENES = {
     "dark": DARK,
     "everything": everything(),
 }
-ALL_IMAGES = images_of(Variant(True, True, True), positions=True)
+ALL_IMAGES = images_of(Variant(*(True for _ in Variant._fields)), positions=True)
 any_scene = pytest.mark.parametrize("what", SCENES.values(), ids=SCENES.keys())
 
 
@@ -79,15 +79,15 @@ def name(call: object) -> str:
 @any_scene
 def test_kernels_contain_what_the_scene_needs(trace: OpenTracer, what: Scene) -> None:
     tracer = trace(what)
-    textured, sky, moving = tracer.variant
+    variant = tracer.variant
     guides, first, second = (compiled_in(kernel) for kernel in tracer.kernels)
     assert guides == {
-        "textured": textured,
-        "has_sky": sky,
-        "moving": moving,
+        "textured": variant.textured,
+        "has_sky": variant.sky,
+        "moving": variant.moving,
         "positions": tracer.settings.positions,
     }
-    assert first == second == {"textured": textured, "has_sky": sky}
+    assert first == second == {"textured": variant.textured, "has_sky": variant.sky, "lamps": variant.lamps}
 
 
 def test_everything_is_counted() -> None:

@@ -78,7 +78,7 @@ def test_the_tracer_does_what_the_scene_needs(subject: Subjects) -> None:
     assert lines[0].startswith("tracer: up to 2 rays per path")
     for kind in ("shadow at hit 1", "shadow at hit 2"):
         assert row(lines, "ray", kind).endswith("left out: there is no light")
-    assert row(lines, "kernel", "second_hit").endswith("without a sky, textures")
+    assert row(lines, "kernel", "second_hit").endswith("without a sky, lamps, textures")
     assert "one scene" in row(lines, "Embree")
 
 
