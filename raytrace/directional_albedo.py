@@ -39,8 +39,8 @@ def table() -> F32:
     """
     nodes, weights = np.polynomial.legendre.leggauss(_POINTS)
     u: F64 = np.asarray((nodes + 1) / 2, dtype=np.float64)
-    share: F64 = weights / 2
-    turn: F64 = (np.arange(_POINTS) + 0.5) * (2 * math.pi / _POINTS)
+    share: F64 = np.asarray(weights / 2, dtype=np.float64)
+    turn: F64 = (np.arange(_POINTS, dtype=np.float64) + 0.5) * (2 * math.pi / _POINTS)
     result = np.empty((SIZE, SIZE, 3))
     for i, cosine in enumerate(np.linspace(0.0, 1.0, SIZE)):
         vz = max(float(cosine), _GRAZING)
