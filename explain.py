@@ -7,6 +7,7 @@ pass is there is found by trying (:mod:`gl.switches`). No kernel is compiled and
 from __future__ import annotations
 
 import json
+import textwrap
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -30,6 +31,9 @@ WORDS: Final = {
     "sky": "a sky",
     "has_sky": "a sky",
     "moving": "moving objects",
+    "lamps": "lamps",
+    "specular": "metals and gloss",
+    "separable": "separable masking",
     "positions": "world positions",
 }
 """What the switches of kernels and kinds of scenes mean; one that is not here goes by its own name."""
@@ -40,6 +44,7 @@ _READERS_WIDTH: Final = 70
 
 _WIDTH: Final = 118
 _INDENT: Final = 40  # where the names of textures begin, or later
+_WORDS_INDENT: Final = 60  # where the words about rays and kernels begin, at most
 
 
 @dataclass(frozen=True)
@@ -61,7 +66,8 @@ class Subject:
     def traits(self) -> FrameTraits:
         """Those that frames of the tracer will have."""
         pixel = self.scene.scene.camera.pixel_size(self.size[1])
-        return FrameTraits(moving="prev_normal" in self.tracer.images, pixel_size=pixel)
+        images = self.tracer.images
+        return FrameTraits(moving="prev_normal" in images, specular="specular" in images, pixel_size=pixel)
 
     @property
     def images(self) -> tuple[str, ...]:
@@ -140,7 +146,8 @@ def tracer_section(subject: Subject) -> list[str]:
         switches = compiled_in(kernel)
         there, missing = (_words(name for name, on in switches.items() if on is wanted) for wanted in (True, False))
         parts = [f"with {there}" if there else "", f"without {missing}" if missing else ""]
-        rows.append(("kernel", _name(kernel), "; ".join(part for part in parts if part)))
+        first, *more = textwrap.wrap("; ".join(part for part in parts if part), _WIDTH - _WORDS_INDENT)
+        rows += [("kernel", _name(kernel), first), *(("", "", line) for line in more)]
     scenes = "two scenes, that of what moves built anew every frame" if tracer.variant.moving else "one scene"
     rows.append(("Embree", tracer.rays.name, scenes))
     wish = f"render.jitter = {_value(config.render.jitter)}"
@@ -177,7 +184,11 @@ def pass_section(subject: Subject) -> list[str]:
     """The passes that run, and those that could, each with the settings that decide on it."""
     plan = subject.plan
     programs = len({node.program for node in plan.passes})
-    rows = [(node.name, _because(subject, node.name)) for node in plan.passes]
+    longest = max(len(node.name) for node in plan.passes)
+    rows: list[tuple[str, ...]] = []
+    for node in plan.passes:
+        first, *more = textwrap.wrap(_because(subject, node.name), _WIDTH - longest - 4, break_on_hyphens=False)
+        rows += [(node.name, first), *(("", line) for line in more)]
     head = f"passes of {subject.denoiser}: {len(plan.passes)}, by {programs} programs, {len(plan.culled)} culled"
     lines = [head, *_columns(rows)]
     lines += [f"  {node.name}  culled: no output needs it" for node in plan.culled]
@@ -219,7 +230,7 @@ def memory_section(subject: Subject) -> list[str]:
 
 def switch_section(subject: Subject) -> list[str]:
     """What another value of each setting would change: passes, GPU memory, upload."""
-    rows: list[tuple[str, ...]] = [("", "passes", "compiled or wired anew", "GPU bytes", "bytes uploaded per frame")]
+    rows: list[tuple[str, ...]] = [("", "passes", "compiled or wired anew", "GPU bytes", "bytes uploaded")]
     before = subject.plan.memory(subject.size)
     for effect in nearest(subject.effects):
         after = effect.plan.memory(subject.size)

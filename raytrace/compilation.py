@@ -16,15 +16,21 @@ from numba import config, njit
 Compiled = Callable[..., Any]
 
 SOURCES = (
+    "brdf",
     "casting",
     "compilation",
     "compiled",
+    "directional_albedo",
     "embree_native",
     "embree_run",
     "gradients",
     "guides",
     "kernels",
+    "kernels_glossy",
+    "lights",
+    "reflectance",
     "sampling",
+    "surface",
     "tables",
     "textures",
 )

@@ -14,7 +14,7 @@ from raytrace.compiled import LIGHT, MATERIAL, SMOOTH, CompiledScene
 from raytrace.guides import Outputs
 from raytrace.tables import Variant
 
-ILLUMINATION = ("direct", "indirect")
+ILLUMINATION = ("direct", "indirect", "specular")
 """The images of a frame with noise; all others come from the guide kernel."""
 
 
@@ -27,9 +27,15 @@ def images_of(variant: Variant, positions: bool, gradients: bool = False) -> tup
 
     ``positions``: the surface points are asked for as well. ``gradients``: temporal gradients are.
     """
-    needed = {"prev_normal": variant.moving, "position": positions, "prev_position": positions}
-    guides = (name for name in Outputs._fields if needed.get(name, True))
-    return (*ILLUMINATION, *guides, *((GRADIENT,) if gradients else ()))
+    needed = {
+        "prev_normal": variant.moving,
+        "position": positions,
+        "prev_position": positions,
+        "specular": variant.specular,
+        "specular_albedo": variant.specular,
+    }
+    images = (name for name in (*ILLUMINATION, *Outputs._fields) if needed.get(name, True))
+    return (*images, *((GRADIENT,) if gradients else ()))
 
 
 def rays_of(scene: CompiledScene) -> dict[str, int]:

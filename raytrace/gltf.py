@@ -224,7 +224,6 @@ def _name_the_rest(file: GltfFile, nodes: list[_Node], notices: Notices) -> None
     primitives = [
         p for m in meshes for p in file.tables(file.entry("meshes", m, "a node"), "primitives", f"meshes[{m}]")
     ]
-    colored = sum("COLOR_0" in file.table(p, "attributes", "a primitive") for p in primitives)
     morphing = sum("targets" in p for p in primitives)
     animations = file.size("animations")
     if lights:
@@ -233,8 +232,6 @@ def _name_the_rest(file: GltfFile, nodes: list[_Node], notices: Notices) -> None
         notices.add(f"{counted(instanced, 'node')} with EXT_mesh_gpu_instancing: drawn once only")
     if skinned or morphing:
         notices.add(f"{counted(skinned + morphing, 'skinned or morphing object')}: drawn in the rest pose")
-    if colored:
-        notices.add(f"{counted(colored, 'primitive')} with vertex colours: drawn without them")
     if animations:
         notices.add(f"{counted(animations, 'animation')} left out: the scene stands still")
     unknown = [

@@ -93,7 +93,13 @@ def change_of(g: Graph, direct: Tex, indirect: Tex, guides: Guides, p: Asvgf, pi
 
 
 def asvgf(
-    g: Graph, signals: dict[str, Tex], noisy: tuple[Tex, Tex], guides: Guides, p: Asvgf, pixel_size: float
+    g: Graph,
+    signals: dict[str, Tex],
+    noisy: tuple[Tex, Tex],
+    guides: Guides,
+    p: Asvgf,
+    pixel_size: float,
+    specular_albedo: Tex | None = None,
 ) -> dict[str, Tex]:
     """Filter ``signals`` as :func:`gl.passes.svgf.svgf` does. ``noisy``: direct and indirect samples of the frame."""
     changes: dict[str, Change] = {}
@@ -101,5 +107,6 @@ def asvgf(
         with g.scope("asvgf"):
             joint = len(signals) == 1
             found = change_of(g, *noisy, guides, p, pixel_size, joint)
-        changes = {name: Change(found, i, p.power if p.cut == "power" else None) for i, name in enumerate(signals)}
-    return svgf(g, signals, guides, p, pixel_size, "asvgf", changes)
+        known = [name for name in signals if name != "specular"]
+        changes = {name: Change(found, i, p.power if p.cut == "power" else None) for i, name in enumerate(known)}
+    return svgf(g, signals, guides, p, pixel_size, "asvgf", changes, specular_albedo)

@@ -48,7 +48,7 @@ class Sample(FragmentPass):
 
     shader = "spatial/sample.frag"
     in_direct = In("irradiance")
-    in_indirect = In("irradiance")
+    in_indirect = In("irradiance, to be added", optional=True)
     in_surface = In(SURFACE)
     in_albedo = In("divisor of the irradiance, where the filter is to see it", optional=True)
     out_color = Out("rgba16f", COLOR)

@@ -48,7 +48,7 @@ def test_explain_tells_what_the_loader_has_to_say(app: App, tmp_path: Path) -> N
     assert outcome.code == 0
     assert "no light in the file: a constant white sky is added" in outcome.err
     assert "nothing in this scene moves" in outcome.err
-    assert "kernel  first_hit                                        with a sky; without textures" in outcome.out
+    assert "kernel  first_hit                                        with a sky; without lamps, textures" in outcome.out
 
 
 @pytest.mark.parametrize("command", ["explain", "graph"])

@@ -19,7 +19,7 @@ from raytrace.scene import Scene
 from raytrace.shot import Shot
 from raytrace.tables import Variant
 from tests.tracer.conftest import OpenTracer
-from tests.tracer.scenes import cornell, everything, rigid
+from tests.tracer.scenes import cornell, everything, glossy, rigid
 
 SIZE = (8, 8)
 DARK = replace(
@@ -31,18 +31,21 @@ SCENES = {
     "sky and no lamp": replace(DARK, sky=(0.5, 0.5, 0.5)),
     "dark": DARK,
     "everything": everything(),
+    "glossy": glossy(),
 }
-ALL_IMAGES = images_of(Variant(True, True, True), positions=True)
+ALL_IMAGES = images_of(Variant(*(True for _ in Variant._fields)), positions=True, gradients=True)
+GLOSS = {"specular", "specular_albedo"}
 any_scene = pytest.mark.parametrize("what", SCENES.values(), ids=SCENES.keys())
 
 
 @pytest.mark.parametrize(
     ("what", "positions", "missing"),
     [
-        ("still", False, {"prev_normal", "position", "prev_position"}),
-        ("moving", False, {"position", "prev_position"}),
-        ("still", True, {"prev_normal"}),
-        ("everything", True, set()),
+        ("still", False, {"prev_normal", "position", "prev_position", *GLOSS}),
+        ("moving", False, {"position", "prev_position", *GLOSS}),
+        ("still", True, {"prev_normal", *GLOSS}),
+        ("everything", True, GLOSS),
+        ("glossy", True, {"prev_normal"}),
     ],
 )
 def test_frames_have_the_images_that_are_told(what: str, positions: bool, missing: set[str]) -> None:
@@ -51,12 +54,11 @@ def test_frames_have_the_images_that_are_told(what: str, positions: bool, missin
         packet = tracer.frame(0, scene.camera, scene.camera, SIZE)
         present = {f.name for f in fields(FramePacket) if isinstance(getattr(packet, f.name), np.ndarray)}
         assert set(tracer.images) == set(images_of(tracer.variant, positions)) == present
-        assert set(ALL_IMAGES) - present == missing
+        assert set(ALL_IMAGES) - present == missing | {"temporal_gradient"}, "nobody asked for gradients"
 
 
 def test_images_of_a_frame_are_all_told() -> None:
-    everything = images_of(Variant(True, True, True), positions=True, gradients=True)
-    assert tuple(f.name for f in fields(FramePacket) if "F32" in str(f.type)) == everything
+    assert {f.name for f in fields(FramePacket) if "F32" in str(f.type)} == set(ALL_IMAGES)
 
 
 @any_scene
@@ -80,15 +82,19 @@ def name(call: object) -> str:
 @any_scene
 def test_kernels_contain_what_the_scene_needs(trace: OpenTracer, what: Scene) -> None:
     tracer = trace(what)
-    textured, sky, moving = tracer.variant
+    variant = tracer.variant
     guides, first, second = (compiled_in(kernel) for kernel in tracer.kernels)
     assert guides == {
-        "textured": textured,
-        "has_sky": sky,
-        "moving": moving,
+        "textured": variant.textured,
+        "has_sky": variant.sky,
+        "moving": variant.moving,
         "positions": tracer.settings.positions,
+        "specular": variant.specular,
     }
-    assert first == second == {"textured": textured, "has_sky": sky}
+    shading = {"textured": variant.textured, "has_sky": variant.sky, "lamps": variant.lamps}
+    if variant.specular:
+        shading["separable"] = False
+    assert first == second == shading
 
 
 def test_everything_is_counted() -> None:

@@ -25,6 +25,8 @@ def asvgf(**changes: object) -> Config:
     return Config(asvgf=replace(Asvgf(), **changes))  # type: ignore[arg-type]
 
 
+GLOSSY = FrameTraits(specular=True)
+
 CASES: dict[str, tuple[Config, str, FrameTraits]] = {
     "none": (Config(), "none", FrameTraits()),
     "reference": (Config(), "reference", FrameTraits()),
@@ -61,6 +63,17 @@ CASES: dict[str, tuple[Config, str, FrameTraits]] = {
     "bmfr_without_demodulation": (load(None, ("bmfr.demodulate=false",)), "bmfr", FrameTraits()),
     "bmfr_moving": (Config(), "bmfr", FrameTraits(moving=True)),
     "bmfr_on_hardware": (Config(), "bmfr", FrameTraits(software=False)),
+    "none_glossy": (Config(), "none", GLOSSY),
+    "accumulate_glossy": (Config(), "accumulate", GLOSSY),
+    "svgf_glossy": (Config(), "svgf", GLOSSY),
+    "svgf_glossy_joint": (svgf(separate=False), "svgf", GLOSSY),
+    "svgf_glossy_without_demodulation": (svgf(demodulate=False), "svgf", GLOSSY),
+    "svgf_glossy_joint_without_demodulation": (svgf(demodulate=False, separate=False), "svgf", GLOSSY),
+    "asvgf_glossy": (Config(), "asvgf", GLOSSY),
+    "joint_glossy": (Config(), "joint", GLOSSY),
+    "bmfr_glossy": (load(None, ('bmfr.features="1,n,w,roughness"',)), "bmfr", GLOSSY),
+    "bmfr_glossy_joint": (load(None, ("bmfr.separate=false",)), "bmfr", GLOSSY),
+    "bmfr_glossy_without_demodulation": (load(None, ("bmfr.demodulate=false",)), "bmfr", GLOSSY),
     "svgf_moving": (Config(), "svgf", FrameTraits(moving=True)),
     "gaussian": (Config(), "gaussian", FrameTraits()),
     "gaussian_whole": (load(None, ("gaussian.separable=false",)), "gaussian", FrameTraits()),

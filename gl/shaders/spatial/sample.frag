@@ -7,7 +7,9 @@
 #include "common/edges.glsl"
 
 uniform sampler2D in_direct;
+#if HAS_IN_INDIRECT
 uniform sampler2D in_indirect;
+#endif
 uniform sampler2D in_surface; // normal, depth
 #if HAS_IN_ALBEDO
 uniform sampler2D in_albedo;
@@ -17,7 +19,10 @@ layout(location = 0) out vec4 out_color;
 
 void main() {
     ivec2 p = ivec2(gl_FragCoord.xy);
-    vec3 c = texelFetch(in_direct, p, 0).rgb + texelFetch(in_indirect, p, 0).rgb;
+    vec3 c = texelFetch(in_direct, p, 0).rgb;
+#if HAS_IN_INDIRECT
+    c += texelFetch(in_indirect, p, 0).rgb;
+#endif
 #if HAS_IN_ALBEDO
     c *= texelFetch(in_albedo, p, 0).rgb;
 #endif
