@@ -7,6 +7,7 @@ pass is there is found by trying (:mod:`gl.switches`). No kernel is compiled and
 from __future__ import annotations
 
 import json
+import textwrap
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -31,6 +32,8 @@ WORDS: Final = {
     "has_sky": "a sky",
     "moving": "moving objects",
     "lamps": "lamps",
+    "punctual": "lights without a surface",
+    "environment": "an environment",
     "positions": "world positions",
 }
 """What the switches of kernels and kinds of scenes mean; one that is not here goes by its own name."""
@@ -40,6 +43,7 @@ _FEW: Final = 3
 
 _WIDTH: Final = 118
 _INDENT: Final = 40  # where the names of textures begin, or later
+_WORDS_INDENT: Final = 56  # where the words about rays and kernels begin, at most
 
 
 @dataclass(frozen=True)
@@ -80,7 +84,7 @@ class Subject:
 
 def run(config: Config, name: str, denoiser: str, animate: bool, jitter: bool) -> None:
     """Print the explanation of a scene, built in or a file. Raises UserError where there is no such scene."""
-    scene: Scene = find_scene(name, animate)
+    scene: Scene = find_scene(name, animate, config.surroundings)
     tell_notices(scene, animate)
     compiled, tracer = prepare_tracer(scene, config)
     with tracer:
@@ -111,13 +115,23 @@ def scene_section(subject: Subject) -> list[str]:
     lamps = _count(content.lamps, "triangle")
     lamps += f", {content.textured_lamps} by a texture" if content.textured_lamps else ""
     lamps += f", {content.double_sided_lamps} on both sides" if content.double_sided_lamps else ""
-    sky = f"takes {content.sky_share:.0%} of the light samples" if content.sky_share else "none"
+    share = f"takes {content.sky_share:.0%} of the light samples"
+    sky = share if content.sky_share and not content.environment_size else "none"
+    environment = "none"
+    if around := subject.scene.scene.environment:
+        assert content.environment_size is not None
+        environment = (
+            f"{around.name}, {_by(content.environment_size)} texels, {content.environment_bytes:,} bytes; {share}"
+        )
+    punctual = ", ".join(f"{count} {kind}" for kind, count in content.punctual.items()) or "none"
     flat = content.triangles - content.smooth
     rows = [
         ("triangles", f"{content.triangles:,} in {_count(content.objects, 'object')}; {motion}"),
         ("textures", textures),
         ("lamps", lamps if content.lamps else "none"),
+        ("lights", f"{punctual} without a surface" if content.punctual else "none without a surface"),
         ("sky", sky),
+        ("environment", environment),
         ("normals", f"the vertices' on {_count(content.smooth, 'triangle')}, the face's on {flat:,}"),
         ("tables", f"{content.table_bytes:,} bytes of main memory, all that the kernels read"),
     ]
@@ -135,7 +149,8 @@ def tracer_section(subject: Subject) -> list[str]:
         switches = compiled_in(kernel)
         there, missing = (_words(name for name, on in switches.items() if on is wanted) for wanted in (True, False))
         parts = [f"with {there}" if there else "", f"without {missing}" if missing else ""]
-        rows.append(("kernel", _name(kernel), "; ".join(part for part in parts if part)))
+        first, *more = textwrap.wrap("; ".join(part for part in parts if part), _WIDTH - _WORDS_INDENT)
+        rows += [("kernel", _name(kernel), first), *(("", "", line) for line in more)]
     scenes = "two scenes, that of what moves built anew every frame" if tracer.variant.moving else "one scene"
     rows.append(("Embree", tracer.rays.name, scenes))
     wish = f"render.jitter = {_value(config.render.jitter)}"

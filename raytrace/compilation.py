@@ -24,6 +24,8 @@ SOURCES = (
     "guides",
     "kernels",
     "lights",
+    "punctual",
+    "rgbe",
     "sampling",
     "tables",
     "textures",

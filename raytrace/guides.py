@@ -14,6 +14,7 @@ import numpy as np
 
 from raytrace.compilation import device, kernel
 from raytrace.compiled import FACE_NORMAL, MATERIAL, OBJECT, SMOOTH
+from raytrace.lights import environment_at
 from raytrace.tables import Variant, interpolate, shading_normal, surface_color
 
 _ZERO, _ONE, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
@@ -74,7 +75,7 @@ class Outputs(NamedTuple):
 def guide_kernel(variant: Variant, positions: bool) -> Callable[..., Any]:
     """Kernel that writes the noise-free guides of a tile; ``positions``: world positions as well."""
     textured = variant.textured
-    has_sky, moving = variant.sky, variant.moving
+    has_sky, environment, moving = variant.sky, variant.environment, variant.moving
 
     @kernel
     def guides(  # type: ignore[no-untyped-def]
@@ -100,6 +101,11 @@ def guide_kernel(variant: Variant, positions: bool) -> Callable[..., Any]:
                 if has_sky:
                     for k in range(3):
                         out.emission[p, k] = tables.sky[k]
+                if environment:
+                    r, g, b, _ = environment_at(tables, directions[i, 0], directions[i, 1], directions[i, 2])
+                    out.emission[p, 0] = r
+                    out.emission[p, 1] = g
+                    out.emission[p, 2] = b
                 out.gradient[p, 0] = _ZERO
                 out.gradient[p, 1] = _ZERO
                 # The sky moves like points at infinity.
