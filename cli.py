@@ -217,7 +217,7 @@ def render_parser() -> Parser:
         "app.py render",
         "Render frames 0 to N-1 of a shot and write the last as PNG; prints the name of each file written.\n"
         "The picture is after anti-aliasing and tone mapping. Scene time advances by 1/30 s per frame.",
-        "A camera path is TOML, keyframes with a smooth curve between them, such as the window records with M:\n"
+        "A camera path is TOML, keyframes with a smooth curve between them, such as the window records with C:\n"
         "  [[key]]\n"
         "  time = 0.0                     # seconds\n"
         "  position = [2.25, 1.5, 2.0]\n"
