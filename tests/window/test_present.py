@@ -110,9 +110,11 @@ def test_a_screenshot_that_cannot_be_written_is_told(tmp_path, capsys):
 def test_a_recorded_path_is_replayed_to_the_bit(tmp_path):
     """In frames that were seldom begun a thirtieth of a second apart: what counts is their number."""
     scene = assets.build("cornell")
+    assert scene.flight is not None
     cameras = [scene.flight(0.37 * index) for index in range(9)]
     assert save_path(tmp_path, cameras, "cornell") == f"saved {tmp_path / 'camera_000.toml'}"
     path = read_camera_path(tmp_path / "camera_000.toml")
+    assert callable(path)
     for index, camera in enumerate(cameras):
         again = path(index / FPS)
         assert again.position == camera.position
