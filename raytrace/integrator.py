@@ -164,7 +164,7 @@ class Tracer:
         self._memory = Memory()
         self.threads = self.settings.threads or len(os.sched_getaffinity(0))
         self._pool = ThreadPoolExecutor(self.threads, "trace") if self.threads > 1 else None
-        self._time: tuple[float, float] | None = None
+        self._time: tuple[float, float] | None = (0.0, 0.0) if not scene.moves else None
         self._lamps: tuple[float, float] | None = None
 
     @property
@@ -198,9 +198,10 @@ class Tracer:
         if self._lamps != (now, lamps):
             self.scene.dim(now, lamps)
             self._lamps = (now, lamps)
-        if self.scene.has_motion and self._time != (now, previous):
+        if self.scene.moves and self._time != (now, previous):
             self.scene.move_to(now, previous)
-            self.rays.move(self.scene.triangles, self.scene.moving_box())
+            if self.scene.has_motion:
+                self.rays.move(self.scene.triangles, self.scene.moving_box())
             self._time = (now, previous)
 
     def primary(self, view: View, pixels: I32) -> Hits:
