@@ -137,7 +137,7 @@ def _bmfr(g: Graph, config: Config, traits: FrameTraits) -> Tex:
     s, p = Signals(g, config), config.bmfr
     threads = thread_count(p.features, traits.software, part_count(p))
     view = View(traits.basis, traits.jitter, traits.pixel_size, traits.index, threads)
-    clean = bmfr(g, s.direct, s.indirect, s.albedo, Guides(g, traits.moving), p, view)
+    clean = bmfr(g, s.direct, s.indirect, s.albedo, Guides(g, traits.moving), p, view, config.asvgf)
     return g.add(display.Modulate(), in_direct=clean, in_albedo=s.albedo, in_emission=s.emission).out_radiance
 
 
@@ -185,7 +185,8 @@ def build(config: Config, denoiser: str, traits: FrameTraits, split: bool = Fals
 
 def remembered(config: Config, denoiser: str) -> str:
     """Which pixels the tracer is to remember for ``denoiser``: one of :data:`raytrace.gradients.RULES`, "" for none."""
-    return config.asvgf.remember if denoiser == "asvgf" and config.asvgf.temporal else ""
+    wanted = {"asvgf": config.asvgf.temporal, "bmfr": config.bmfr.adaptive}.get(denoiser, False)
+    return config.asvgf.remember if wanted else ""
 
 
 def _samples(g: Graph) -> dict[str, Tex]:

@@ -48,7 +48,8 @@ class Stage:
         if state.animate or state.step or self._frame < 0:
             self._frame, state.step = self._frame + 1, False
         remember = remembered(state.config, state.denoiser)
-        self._worker.submit(Request(camera, size, self._frame / FPS, state.jitter, cut, remember))
+        lamps = float(state.lamps)
+        self._worker.submit(Request(camera, size, self._frame / FPS, state.jitter, cut, remember, lamps))
 
     def take(self) -> FramePacket | None:
         """The frame under way, or None if it is not ready."""

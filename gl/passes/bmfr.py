@@ -22,8 +22,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-from config import Bmfr
+from config import Asvgf, Bmfr
 from gl.graph import ComputePass, FragmentPass, Graph, In, Out, Prev, Tex, Uniform
+from gl.passes.asvgf import LAMBDA, change_of
+from gl.passes.fast_history import FastHistory
 from gl.passes.temporal import Guides
 from raytrace.frame import Basis, Vector
 
@@ -98,6 +100,12 @@ class Accumulate(FragmentPass):
     u_normal_tolerance = Uniform("float", "[0;4] squared distance of the normals")
 
 
+class AccumulateAdaptive(Accumulate):
+    """The same, but where light has changed the history follows it and counts for less (Schied et al. 2018)."""
+
+    in_lambda = In(LAMBDA)
+
+
 class Fit(ComputePass):
     """Replace each block by the least-squares combination of its features (feature fitting).
 
@@ -154,6 +162,12 @@ class AccumulateFit(FragmentPass):
     u_alpha = Uniform("float", "[0;1] smallest weight of the new fit")
 
 
+class AccumulateFitAdaptive(AccumulateFit):
+    """The same, but where light has changed the history follows it and counts for less (Schied et al. 2018)."""
+
+    in_lambda = In(LAMBDA)
+
+
 def layout(features: str) -> dict[str, int]:
     """``FEATURES``, the length of a row, and for each feature ``X_AT``, its place there; -1 for what is not listed."""
     places = {f"{name.upper()}_AT": -1 for name in COMPONENTS if name != "1"}
@@ -186,20 +200,37 @@ def shared_bytes(features: int, threads: int, parts: int = 0) -> int:
     return 4 * triangle * slots + 2 * 16 * threads + 16 * features * (1 + parts)
 
 
-def bmfr(g: Graph, direct: Tex, indirect: Tex, albedo: Tex, guides: Guides, p: Bmfr, view: View) -> Tex:
-    """Filter the sum of ``direct`` and ``indirect`` (noisy irradiance); returns the clean one."""
+def bmfr(
+    g: Graph,
+    direct: Tex,
+    indirect: Tex,
+    albedo: Tex,
+    guides: Guides,
+    p: Bmfr,
+    view: View,
+    gradients: Asvgf = Asvgf(),  # noqa: B008, a frozen one
+) -> Tex:
+    """Filter the sum of ``direct`` and ``indirect`` (noisy irradiance); returns the clean one.
+
+    ``gradients``: how changes of light are found, if they are asked for.
+    """
     with g.scope("bmfr"):
+        change: dict[str, Tex] = {}
+        if p.adaptive:
+            change["in_lambda"] = change_of(g, direct, indirect, guides, gradients, view.pixel_size, joint=True)
+        adaptive = {"ADAPTIVE": 1} if change else {}
         noisy, guide = g.history("bmfr.noisy", "rgba16f"), g.history("bmfr.guide", "rg32f")
         samples = g.add(
-            Accumulate(
+            (AccumulateAdaptive if change else Accumulate)(
                 u_view=view.rows,
                 u_pixel_size=view.pixel_size,
                 u_alpha=p.alpha,
                 u_max_history=float(p.max_history),
                 u_position_tolerance=p.position_tolerance,
                 u_normal_tolerance=p.normal_tolerance,
-                defines={"ROUND_HISTORY": int(p.round_history)},
+                defines={"ROUND_HISTORY": int(p.round_history), **adaptive},
             ),
+            "accumulate",
             in_direct=direct,
             in_indirect=indirect,
             in_motion=guides.motion,
@@ -207,17 +238,26 @@ def bmfr(g: Graph, direct: Tex, indirect: Tex, albedo: Tex, guides: Guides, p: B
             prev_color=noisy,
             prev_guide=guide,
             **guides.optional,
+            **change,
         )
-        g.feed(noisy, samples.out_color)
+        accumulated, fast = samples.out_color, None
+        if p.fast_clamp:
+            fast = FastHistory(g, "bmfr", direct, indirect, samples.out_reprojection, p)
+            accumulated = fast.bound(accumulated)
+        g.feed(noisy, accumulated)
         g.feed(guide, samples.out_guide)
         features = {"in_albedo": albedo} if "albedo" in p.features.split(",") else {}
-        fit = g.add(Fit(p, view), in_color=samples.out_color, in_surface=guides.surface, **features).out_color
+        fit = g.add(Fit(p, view), in_color=accumulated, in_surface=guides.surface, **features).out_color
         fitted = g.history("bmfr.fitted", "rgba16f")
         clean = g.add(
-            AccumulateFit(u_alpha=p.alpha_fit),
+            (AccumulateFitAdaptive if change else AccumulateFit)(u_alpha=p.alpha_fit, defines=adaptive),
+            "accumulate_fit",
             in_color=fit,
             in_reprojection=samples.out_reprojection,
             prev_color=fitted,
+            **change,
         ).out_color
+        if fast is not None:
+            clean = fast.bound(clean)
         g.feed(fitted, clean)
         return clean

@@ -38,6 +38,7 @@ from types import MappingProxyType
 
 from config import Svgf
 from gl.graph import FragmentPass, Graph, In, Out, Tex, Uniform
+from gl.passes.fast_history import FastHistory
 from gl.passes.temporal import REPROJECTION, Change, Guides, accumulate, reproject
 
 
@@ -131,6 +132,8 @@ def _filter_signal(
     if reprojection is not None:
         history = g.history(name, "rgba16f")
         x, moments = accumulate(g, x, reprojection, history, p, clamp=p.clamp, change=change)
+        if p.fast_clamp:
+            x = FastHistory(g, name, noisy, None, reprojection, p).bound(x)
         if change is not None:
             reprojection = moments  # where the length of this signal's own history is
         estimate = {"in_moments": moments, "in_reprojection": reprojection}
