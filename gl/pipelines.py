@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from config import Config, Display, Svgf
 from gl.graph import Graph, Tex
 from gl.passes import display
-from gl.passes.asvgf import asvgf
+from gl.passes.asvgf import asvgf, change_of
 from gl.passes.bad_pixels import mark_bad
 from gl.passes.bmfr import View, bmfr, part_count, thread_count
 from gl.passes.exposure import auto_exposure
@@ -137,8 +137,16 @@ def _bmfr(g: Graph, config: Config, traits: FrameTraits) -> Tex:
     s, p = Signals(g, config), config.bmfr
     threads = thread_count(p.features, traits.software, part_count(p))
     view = View(traits.basis, traits.jitter, traits.pixel_size, traits.index, threads)
-    clean = bmfr(g, s.direct, s.indirect, s.albedo, Guides(g, traits.moving), p, view, config.asvgf)
-    return g.add(display.Modulate(), in_direct=clean, in_albedo=s.albedo, in_emission=s.emission).out_radiance
+    signals, albedo_after = {"direct": s.direct, "indirect": s.indirect}, {"in_albedo": s.albedo}
+    if not p.demodulate:
+        both = g.add(display.Combine(), in_direct=s.direct, in_indirect=s.indirect, in_albedo=s.albedo).out_color
+        signals, albedo_after = {"direct": both}, {}
+    guides, change = Guides(g, traits.moving), None
+    if p.adaptive and p.temporal:
+        with g.scope("bmfr"):
+            change = change_of(g, s.direct, s.indirect, guides, config.asvgf, traits.pixel_size, joint=True)
+    clean = bmfr(g, signals, s.albedo, guides, p, view, change)
+    return g.add(display.Modulate(), in_direct=clean, in_emission=s.emission, **albedo_after).out_radiance
 
 
 def _reference(g: Graph, config: Config, traits: FrameTraits) -> Tex:
@@ -185,7 +193,9 @@ def build(config: Config, denoiser: str, traits: FrameTraits, split: bool = Fals
 
 def remembered(config: Config, denoiser: str) -> str:
     """Which pixels the tracer is to remember for ``denoiser``: one of :data:`raytrace.gradients.RULES`, "" for none."""
-    wanted = {"asvgf": config.asvgf.temporal, "bmfr": config.bmfr.adaptive}.get(denoiser, False)
+    wanted = {"asvgf": config.asvgf.temporal, "bmfr": config.bmfr.adaptive and config.bmfr.temporal}.get(
+        denoiser, False
+    )
     return config.asvgf.remember if wanted else ""
 
 

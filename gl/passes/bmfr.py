@@ -22,9 +22,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-from config import Asvgf, Bmfr
+from config import Bmfr
 from gl.graph import ComputePass, FragmentPass, Graph, In, Out, Prev, Tex, Uniform
-from gl.passes.asvgf import LAMBDA, change_of
+from gl.passes.asvgf import LAMBDA
 from gl.passes.fast_history import FastHistory
 from gl.passes.temporal import Guides
 from raytrace.frame import Basis, Vector
@@ -81,7 +81,7 @@ class Accumulate(FragmentPass):
 
     shader = "bmfr/accumulate.frag"
     in_direct = In("irradiance")
-    in_indirect = In("irradiance")
+    in_indirect = In("irradiance, to be added", optional=True)
     in_motion = In("xy: previous uv - uv; z: expected previous depth, scene units; w: object id, -1 = miss")
     in_surface = In("xyz: shading normal, world; w: depth, scene units")
     in_prev_normal = In(
@@ -104,6 +104,16 @@ class AccumulateAdaptive(Accumulate):
     """The same, but where light has changed the history follows it and counts for less (Schied et al. 2018)."""
 
     in_lambda = In(LAMBDA)
+
+
+class Samples(FragmentPass):
+    """This frame's samples alone, in the form in which :class:`Accumulate` hands them on."""
+
+    shader = "bmfr/samples.frag"
+    in_direct = In("irradiance")
+    in_indirect = In("irradiance, to be added", optional=True)
+    in_surface = In("xyz: shading normal, world; w: depth, scene units")
+    out_color = Out("rgba16f", SAMPLES)
 
 
 class Fit(ComputePass):
@@ -202,26 +212,29 @@ def shared_bytes(features: int, threads: int, parts: int = 0) -> int:
 
 def bmfr(
     g: Graph,
-    direct: Tex,
-    indirect: Tex,
+    signals: dict[str, Tex],
     albedo: Tex,
     guides: Guides,
     p: Bmfr,
     view: View,
-    gradients: Asvgf = Asvgf(),  # noqa: B008, a frozen one
+    change: Tex | None = None,
 ) -> Tex:
-    """Filter the sum of ``direct`` and ``indirect`` (noisy irradiance); returns the clean one.
+    """Filter the sum of ``signals`` (noisy irradiance by name: "direct" and, if it is apart, "indirect"); returns the
+    clean one. Histories are named by whether the signals hold the albedo.
 
-    ``gradients``: how changes of light are found, if they are asked for.
+    ``change``: what :func:`gl.passes.asvgf.change_of` knows of the light, both signals being one.
     """
+    inputs = {f"in_{name}": noisy for name, noisy in signals.items()}
+    names = "bmfr" if p.demodulate else "bmfr.radiance"
+    extra = {} if change is None else {"in_lambda": change}
+    adaptive = {} if change is None else {"ADAPTIVE": 1}
     with g.scope("bmfr"):
-        change: dict[str, Tex] = {}
-        if p.adaptive:
-            change["in_lambda"] = change_of(g, direct, indirect, guides, gradients, view.pixel_size, joint=True)
-        adaptive = {"ADAPTIVE": 1} if change else {}
-        noisy, guide = g.history("bmfr.noisy", "rgba16f"), g.history("bmfr.guide", "rg32f")
-        samples = g.add(
-            (AccumulateAdaptive if change else Accumulate)(
+        if not p.temporal:
+            samples = g.add(Samples(), in_surface=guides.surface, **inputs).out_color
+            return _fit(g, samples, albedo, guides, p, view) if p.fit else samples
+        noisy, guide = g.history(f"{names}.noisy", "rgba16f"), g.history(f"{names}.guide", "rg32f")
+        found = g.add(
+            (Accumulate if change is None else AccumulateAdaptive)(
                 u_view=view.rows,
                 u_pixel_size=view.pixel_size,
                 u_alpha=p.alpha,
@@ -231,33 +244,37 @@ def bmfr(
                 defines={"ROUND_HISTORY": int(p.round_history), **adaptive},
             ),
             "accumulate",
-            in_direct=direct,
-            in_indirect=indirect,
             in_motion=guides.motion,
             in_surface=guides.surface,
             prev_color=noisy,
             prev_guide=guide,
+            **inputs,
             **guides.optional,
-            **change,
+            **extra,
         )
-        accumulated, fast = samples.out_color, None
+        accumulated, fast = found.out_color, None
         if p.fast_clamp:
-            fast = FastHistory(g, "bmfr", direct, indirect, samples.out_reprojection, p)
+            fast = FastHistory(g, names, signals["direct"], signals.get("indirect"), found.out_reprojection, p)
             accumulated = fast.bound(accumulated)
         g.feed(noisy, accumulated)
-        g.feed(guide, samples.out_guide)
-        features = {"in_albedo": albedo} if "albedo" in p.features.split(",") else {}
-        fit = g.add(Fit(p, view), in_color=accumulated, in_surface=guides.surface, **features).out_color
-        fitted = g.history("bmfr.fitted", "rgba16f")
+        g.feed(guide, found.out_guide)
+        if not p.fit:
+            return accumulated
+        fitted = g.history(f"{names}.fitted", "rgba16f")
         clean = g.add(
-            (AccumulateFitAdaptive if change else AccumulateFit)(u_alpha=p.alpha_fit, defines=adaptive),
+            (AccumulateFit if change is None else AccumulateFitAdaptive)(u_alpha=p.alpha_fit, defines=adaptive),
             "accumulate_fit",
-            in_color=fit,
-            in_reprojection=samples.out_reprojection,
+            in_color=_fit(g, accumulated, albedo, guides, p, view),
+            in_reprojection=found.out_reprojection,
             prev_color=fitted,
-            **change,
+            **extra,
         ).out_color
         if fast is not None:
             clean = fast.bound(clean)
         g.feed(fitted, clean)
         return clean
+
+
+def _fit(g: Graph, samples: Tex, albedo: Tex, guides: Guides, p: Bmfr, view: View) -> Tex:
+    features = {"in_albedo": albedo} if "albedo" in p.features.split(",") else {}
+    return g.add(Fit(p, view), in_color=samples, in_surface=guides.surface, **features).out_color
