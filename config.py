@@ -82,6 +82,11 @@ class Svgf(Section):
     color_clamp_sigma: float = param(
         1.0, 0, 10, "[0;10] reach of that bound around their mean, in their standard deviations"
     )
+    fast_clamp: bool = param(
+        False, doc="bound the accumulated colour by the mean of the last few frames around the pixel", structural=True
+    )
+    fast_frames: int = param(6, 1, 32, "[1;32] those last frames")
+    fast_sigma: float = param(2.0, 0, 10, "[0;10] reach of that bound, in their standard deviations")
     variance_guided: bool = param(
         True, doc="steer the luminance weight by the variance", structural=True, heading="variance"
     )
@@ -125,13 +130,13 @@ class Asvgf(Svgf):
         heading="gradients",
     )
     gradient_iterations: int = param(
-        5, 1, 8, "[1;8] à-trous iterations that spread the gradients over 3x3 pixels and more", structural=True
+        3, 1, 8, "[1;8] à-trous iterations that spread the gradients over 3x3 pixels and more", structural=True
     )
     gradient_guided: bool = param(True, doc="let luminance steer how gradients are spread", structural=True)
     gradient_sigma_l: float = param(4.0, 0.01, 1000, "[0.01;1000] tolerance for luminance there, in deviations of it")
     gain: float = param(1.0, 0, 1000, "[0;1000] share of the history that is void, per relative change of light")
     follow: bool = param(
-        False, doc="let the history follow the light, by the factor that gradients tell", structural=True
+        True, doc="let the history follow the light, by the factor that gradients tell", structural=True
     )
     widen: bool = param(False, doc="take the largest such share of 3x3 neighbours", structural=True)
     cut: str = param(
@@ -161,6 +166,14 @@ class Bmfr(Section):
     round_history: bool = param(True, doc="round the history's length before it is used", structural=True)
     alpha: float = param(0.2, 0, 1, "[0;1] smallest share of the new frame before the fit; 0: running mean")
     alpha_fit: float = param(0.1, 0, 1, "[0;1] smallest share of the new fit; 0: running mean")
+    fast_clamp: bool = param(
+        False, doc="bound the accumulated colour by the mean of the last few frames around the pixel", structural=True
+    )
+    fast_frames: int = param(6, 1, 32, "[1;32] those last frames")
+    fast_sigma: float = param(2.0, 0, 10, "[0;10] reach of that bound, in their standard deviations")
+    adaptive: bool = param(
+        False, doc="cut both histories where light has changed, as A-SVGF does, by its parameters", structural=True
+    )
     fit: bool = param(
         True, doc="fit blocks by features; off: what was accumulated before", structural=True, heading="regression"
     )
@@ -437,6 +450,7 @@ PRESETS["asvgf"] = {
         "gradient_iterations": 5,
         "gradient_guided": True,
         "gain": 1.0,
+        "follow": False,
         "widen": False,
         "cut": "harmonic",
     },
@@ -450,10 +464,12 @@ PRESETS["asvgf"] = {
         "gradient_iterations": 5,
         "gradient_guided": True,
         "gain": 1.0,
+        "follow": False,
         "widen": True,
         "cut": "harmonic",
     },
-    "best": {**PRESETS["svgf"]["best"], "gain": 1.0},
+    # What measured best in moving and in still light (docs/asvgf.md).
+    "best": {**PRESETS["svgf"]["best"], "gradient_iterations": 3, "gain": 1.0, "follow": True},
 }
 """section -> value of its ``preset`` key -> values of the keys it owns. A key set by file or ``--set`` wins over it.
 

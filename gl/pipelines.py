@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from config import Config, Display, Svgf
 from gl.graph import Graph, Tex
 from gl.passes import display
-from gl.passes.asvgf import asvgf
+from gl.passes.asvgf import asvgf, change_of
 from gl.passes.bad_pixels import mark_bad
 from gl.passes.bmfr import View, bmfr, part_count, thread_count
 from gl.passes.exposure import auto_exposure
@@ -199,7 +199,11 @@ def _bmfr(g: Graph, config: Config, traits: FrameTraits) -> Tex:
         second["in_specular"] = bmfr(g, {"direct": s.specular}, features, guides, p, view, "bmfr.specular")
     elif s.specular is not None:
         signals = {"direct": s.together(g)}
-    clean = bmfr(g, signals, features, guides, p, view)
+    change = None
+    if p.adaptive and p.temporal:
+        with g.scope("bmfr"):
+            change = change_of(g, s.direct, s.indirect, guides, config.asvgf, traits.pixel_size, joint=True)
+    clean = bmfr(g, signals, features, guides, p, view, change=change)
     return display.modulate(g, in_direct=clean, in_emission=s.emission, **second, **albedos)
 
 
@@ -262,7 +266,10 @@ def build(config: Config, denoiser: str, traits: FrameTraits, split: bool = Fals
 
 def remembered(config: Config, denoiser: str) -> str:
     """Which pixels the tracer is to remember for ``denoiser``: one of :data:`raytrace.gradients.RULES`, "" for none."""
-    return config.asvgf.remember if denoiser == "asvgf" and config.asvgf.temporal else ""
+    wanted = {"asvgf": config.asvgf.temporal, "bmfr": config.bmfr.adaptive and config.bmfr.temporal}.get(
+        denoiser, False
+    )
+    return config.asvgf.remember if wanted else ""
 
 
 def _samples(g: Graph, traits: FrameTraits) -> dict[str, Tex]:

@@ -30,7 +30,7 @@ class Action(Enum):
     VIEW = auto()
     """Look at another texture of the graph [+1 or -1: the next or the one before]."""
     FLIP = auto()
-    """Show or hide something that is no parameter of the picture [a switch of :class:`ui.state.State`]."""
+    """Show or hide, or switch, something that is no parameter of the picture [a switch of :class:`ui.state.State`]."""
     RESOLUTION = auto()
     """Render at the next size of the ladder [+1 or -1]."""
     PATH = auto()
@@ -81,6 +81,7 @@ BINDINGS: Final = (
     Binding("DOWN", Action.COUNT, "half a stop darker", "display.exposure -0.5"),
     Binding("L", Action.NEXT, "exposure by itself (light meter) on or off", "display.auto_exposure"),
     Binding("SPACE", Action.ANIMATE, "moving objects and lamps stop or go on"),
+    Binding("O", Action.FLIP, "lamps off or on", "lamps"),
     Binding("PERIOD", Action.STEP, "one step of the animation, then stop"),
     Binding("N", Action.NEXT_SCENE, "next of the scenes that come with the program"),
     Binding("R", Action.RESET_CAMERA, "camera back to where it began"),

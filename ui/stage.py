@@ -52,7 +52,8 @@ class Stage:
         if state.animate or state.step or self._frame < 0:
             self._frame, state.step = self._frame + 1, False
         remember = remembered(state.config, state.denoiser)
-        self._worker.submit(Request(camera, size, self._frame / FPS, state.jitter, cut, remember))
+        lamps = float(state.lamps)
+        self._worker.submit(Request(camera, size, self._frame / FPS, state.jitter, cut, remember, lamps))
 
     def take_path(self) -> list[Camera]:
         """The cameras noted since the last call, one for each frame that was begun."""

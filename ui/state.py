@@ -42,7 +42,7 @@ class TextureLook:
 
 @dataclass
 class State:
-    """``denoiser``: a key of :data:`gl.pipelines.DENOISERS`. ``animate``: the scene's time goes on.
+    """``denoiser``: a key of :data:`gl.pipelines.DENOISERS`. ``animate``: the scene's time goes on. ``lamps``: are on.
 
     ``view``: name of the texture looked at, :data:`PICTURE` for none; ``look``: how it is shown; ``textures``: the
     names there are, as the last frame left them. ``split``: the noisy frame is shown to the left of the mouse.
@@ -59,6 +59,7 @@ class State:
     config: Config
     denoiser: str
     animate: bool = True
+    lamps: bool = True
     before: str = ""
     view: str = PICTURE
     look: TextureLook = field(default_factory=TextureLook)

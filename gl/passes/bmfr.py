@@ -24,6 +24,8 @@ from typing import Final
 
 from config import Bmfr
 from gl.graph import ComputePass, FragmentPass, Graph, In, Out, Prev, Tex, Uniform
+from gl.passes.asvgf import LAMBDA
+from gl.passes.fast_history import FastHistory
 from gl.passes.temporal import Guides
 from raytrace.frame import Basis, Vector
 
@@ -98,6 +100,12 @@ class Accumulate(FragmentPass):
     u_normal_tolerance = Uniform("float", "[0;4] squared distance of the normals")
 
 
+class AccumulateAdaptive(Accumulate):
+    """The same, but where light has changed the history follows it and counts for less (Schied et al. 2018)."""
+
+    in_lambda = In(LAMBDA)
+
+
 class Samples(FragmentPass):
     """This frame's samples alone, in the form in which :class:`Accumulate` hands them on."""
 
@@ -170,6 +178,12 @@ class AccumulateFit(FragmentPass):
     u_alpha = Uniform("float", "[0;1] smallest weight of the new fit")
 
 
+class AccumulateFitAdaptive(AccumulateFit):
+    """The same, but where light has changed the history follows it and counts for less (Schied et al. 2018)."""
+
+    in_lambda = In(LAMBDA)
+
+
 def layout(features: str) -> dict[str, int]:
     """``FEATURES``, the length of a row, and for each feature ``X_AT``, its place there; -1 for what is not listed.
 
@@ -206,48 +220,68 @@ def shared_bytes(features: int, threads: int, parts: int = 0) -> int:
 
 
 def bmfr(
-    g: Graph, signals: dict[str, Tex], features: dict[str, Tex], guides: Guides, p: Bmfr, view: View, name: str = "bmfr"
+    g: Graph,
+    signals: dict[str, Tex],
+    features: dict[str, Tex],
+    guides: Guides,
+    p: Bmfr,
+    view: View,
+    name: str = "bmfr",
+    change: Tex | None = None,
 ) -> Tex:
     """Filter the sum of ``signals`` (noisy irradiance by name: "direct" and, if it is apart, "indirect"); returns the
     clean one. Histories are named by ``name`` and by whether the signals hold the albedo.
 
-    ``features``: textures of features that are no guides, "albedo" and where there is one "roughness".
+    ``features``: textures of features that are no guides, "albedo" and where there is one "roughness". ``change``: what
+    :func:`gl.passes.asvgf.change_of` knows of the light, both signals being one.
     """
     inputs = {f"in_{name}": noisy for name, noisy in signals.items()}
     names = name if p.demodulate else f"{name}.radiance"
+    extra = {} if change is None else {"in_lambda": change}
+    adaptive = {} if change is None else {"ADAPTIVE": 1}
     with g.scope(name):
         if not p.temporal:
             samples = g.add(Samples(), in_surface=guides.surface, **inputs).out_color
             return _fit(g, samples, features, guides, p, view) if p.fit else samples
         noisy, guide = g.history(f"{names}.noisy", "rgba16f"), g.history(f"{names}.guide", "rg32f")
-        accumulated = g.add(
-            Accumulate(
+        found = g.add(
+            (Accumulate if change is None else AccumulateAdaptive)(
                 u_view=view.rows,
                 u_pixel_size=view.pixel_size,
                 u_alpha=p.alpha,
                 u_max_history=float(p.max_history),
                 u_position_tolerance=p.position_tolerance,
                 u_normal_tolerance=p.normal_tolerance,
-                defines={"ROUND_HISTORY": int(p.round_history)},
+                defines={"ROUND_HISTORY": int(p.round_history), **adaptive},
             ),
+            "accumulate",
             in_motion=guides.motion,
             in_surface=guides.surface,
             prev_color=noisy,
             prev_guide=guide,
             **inputs,
             **guides.optional,
+            **extra,
         )
-        g.feed(noisy, accumulated.out_color)
-        g.feed(guide, accumulated.out_guide)
+        accumulated, fast = found.out_color, None
+        if p.fast_clamp:
+            fast = FastHistory(g, names, signals["direct"], signals.get("indirect"), found.out_reprojection, p)
+            accumulated = fast.bound(accumulated)
+        g.feed(noisy, accumulated)
+        g.feed(guide, found.out_guide)
         if not p.fit:
-            return accumulated.out_color
+            return accumulated
         fitted = g.history(f"{names}.fitted", "rgba16f")
         clean = g.add(
-            AccumulateFit(u_alpha=p.alpha_fit),
-            in_color=_fit(g, accumulated.out_color, features, guides, p, view),
-            in_reprojection=accumulated.out_reprojection,
+            (AccumulateFit if change is None else AccumulateFitAdaptive)(u_alpha=p.alpha_fit, defines=adaptive),
+            "accumulate_fit",
+            in_color=_fit(g, accumulated, features, guides, p, view),
+            in_reprojection=found.out_reprojection,
             prev_color=fitted,
+            **extra,
         ).out_color
+        if fast is not None:
+            clean = fast.bound(clean)
         g.feed(fitted, clean)
         return clean
 

@@ -40,6 +40,7 @@ from typing import Any
 from config import Svgf
 from gl.graph import FragmentPass, Graph, In, Out, Tex, Uniform
 from gl.passes.display import GLOSSY
+from gl.passes.fast_history import FastHistory
 from gl.passes.temporal import REPROJECTION, Change, Guides, accumulate, reproject
 
 GLOSS = "of specular light: rgb: its albedo, 0: there is none; a: roughness"
@@ -160,6 +161,8 @@ def _filter_signal(
     if reprojection is not None:
         history = g.history(name, "rgba16f")
         x, moments = accumulate(g, x, reprojection, history, p, clamp=p.clamp, change=change)
+        if p.fast_clamp:
+            x = FastHistory(g, name, noisy, None, reprojection, p).bound(x)
         if change is not None:
             reprojection = moments  # where the length of this signal's own history is
         estimate = {"in_moments": moments, "in_reprojection": reprojection}

@@ -152,6 +152,20 @@ def animation(app: App) -> None:
     assert difference(stopped, app.settled()) < STILL
 
 
+def lamps(app: App) -> None:
+    """A-SVGF shows the dark at once, SVGF fades: three pictures after the key tell them apart."""
+    shares = {}
+    for key, denoiser in (("1", "svgf"), ("3", "asvgf")):
+        app.press(key)
+        app.await_passes(plan(denoiser))
+        before = app.settled().mean()
+        app.ask("o", "lamps off")
+        shares[denoiser] = [app.picture().mean() / before for _ in range(3)]
+        app.ask("o", "lamps on")
+        assert abs(app.settled().mean() / before - 1.0) < 0.05
+    assert shares["asvgf"][-1] < 0.05 < shares["svgf"][-1] < 0.95, shares
+
+
 def single_step(app: App) -> None:
     app.ask("F6", "render.jitter = off")
     with albedo(app) as another:
@@ -312,6 +326,7 @@ CHECKS: dict[str, Callable[[App], None]] = {
     "0": method("0", "none"),
     "1": method("1", "svgf"),
     "2": method("2", "bmfr"),
+    "3": method("3", "asvgf"),
     "TAB": previous,
     "P": stage("p", "svgf.preset=paper", "svgf.preset=reference", "svgf.preset=best"),
     "F1": stage("F1", "svgf.temporal=false", "svgf.temporal=true"),
@@ -329,6 +344,7 @@ CHECKS: dict[str, Callable[[App], None]] = {
     "DOWN": exposure("Down", "Up", -1),
     "L": stage("l", "display.auto_exposure=true", "display.auto_exposure=false"),
     "SPACE": animation,
+    "O": lamps,
     "PERIOD": single_step,
     "N": next_scene,
     "R": camera_home,

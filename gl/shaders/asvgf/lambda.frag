@@ -37,5 +37,5 @@ void main() {
     vec2 relative = clamp(c.xz / max(max(c.yw, SHARE_FLOOR * (c.y + c.w)), vec2(1e-30)), -1.0, 1.0);
     factor = mix(1.0 / max(1.0 - relative, vec2(1.0 / LARGEST_FACTOR)), 1.0 + relative, lessThan(relative, vec2(0.0)));
 #endif
-    out_lambda = vec4(lambda, factor);
+    out_lambda = round_to_half(vec4(lambda, factor));
 }
