@@ -9,6 +9,7 @@ import math
 from pathlib import Path
 from typing import Any
 
+from bench.claims import claims
 from bench.goals import GOALS
 from bench.results import Report, contenders
 from bench.scores import Pictures
@@ -30,6 +31,7 @@ def write_json(path: Path, report: Report) -> None:
     content = plain(report) | {"goals": plain(goals)}
     for result, written in zip(report.quality, content["quality"], strict=True):
         written["contenders"] = plain(contenders(result))
+        written["claims"] = plain(claims(result))
     text = json.dumps(content, indent=2, allow_nan=False) + "\n"
     replace_file(path, lambda target: target.write_text(text, encoding="utf-8"))
 

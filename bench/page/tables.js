@@ -67,6 +67,17 @@ function drawTable() {
     "Variants with anti-aliasing do not compete: it comes after what errors are taken of.";
 }
 
+function drawClaims() {
+  sortable(byId("claims"), [
+    { head: "method", value: (c) => c.method, text: (c) => c.method },
+    { head: scene().name, value: (c) => c.what, cell: (cell, c) => { cell.textContent = c.what; cell.style.textAlign = "left"; } },
+    { head: "measured", value: (c) => Number(c.value) || 0, text: (c) => c.value },
+    { head: "at least", value: (c) => c.limit, text: (c) => c.limit },
+    { head: "", value: (c) => Number(c.holds), cell: (cell, c) => { cell.textContent = c.holds ? "holds" : "does not hold"; cell.className = c.holds ? "good" : "bad"; } },
+  ], scene().claims, { column: null, down: false });
+  byId("claims-section").hidden = !scene().claims.length;
+}
+
 function drawEventsTable(events, names) {
   const columns = [
     { head: "method", value: (r) => r.name, cell: named },

@@ -191,14 +191,15 @@ const viewer = (() => {
         canvas.height = source.naturalHeight * 3;
         const context = canvas.getContext("2d");
         context.imageSmoothingEnabled = false;
-        context.drawImage(source, 0, 0, canvas.width, canvas.height);
+        if (name !== REFERENCE) context.drawImage(source, 0, 0, canvas.width, canvas.height);
+        else for (const row of scene().scored) context.drawImage(source, 0, row, source.naturalWidth, 1, 0, 3 * row, canvas.width, 3);
       };
       source.src = uri;
       rows.push(make("span", {}, name), canvas);
     }
     byId("strips").replaceChildren(...rows);
     byId("strip-say").textContent = `The line of pixels at half the height, frame ${scene().stripFrames[0]} on top to frame ${scene().stripFrames.slice(-1)[0]} below. ` +
-      "What flickers is rough from line to line; what lags is smeared. The reference has only the frames that are scored; the others are black. Below, the error of each of them.";
+      "What flickers is rough from line to line; what lags is smeared. Of the reference there are only the scored frames. Below, the error in each of them.";
   }
 
   // Matplotlib's magma (CC0), interpolated between a few of its colours.

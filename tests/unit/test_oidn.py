@@ -9,9 +9,7 @@ from bench import oidn, running
 from bench.methods import METHODS
 from raytrace.frame import FramePacket
 
-needs_oidn = pytest.mark.skipif(
-    not oidn.installed(), reason="the optional requirements-compare.txt is not installed"
-)
+needs_oidn = pytest.mark.skipif(not oidn.installed(), reason="the optional requirements-compare.txt is not installed")
 
 
 def packet(noise: float) -> FramePacket:
