@@ -12,8 +12,9 @@ import itertools
 import os
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -36,8 +37,10 @@ I32 = NDArray[np.int32]
 U32 = NDArray[np.uint32]
 
 REFERENCE_SEED = 0x5EED0000
-"""Added to the run's seed for references, whose frame numbers moreover start at 2^31: they draw other numbers than any
-frame does."""
+"""Added to the run's seed for references, whose frame numbers moreover start at :data:`FIRST_SAMPLE`: they draw other
+numbers than any frame does."""
+
+FIRST_SAMPLE = 1 << 31
 
 
 _identities = itertools.count(1)
@@ -282,8 +285,6 @@ class Tracer:
         view, _ = self._views(camera, camera, size)
         count = size[0] * size[1]
         sums = np.zeros((2, count, 3))
-        normal = self.settings
-        self.settings = replace(normal, seed=(normal.seed + REFERENCE_SEED) & 0xFFFFFFFF, generator=HASH)
         done = [0]
 
         def tile(pixels: I32) -> None:
@@ -292,7 +293,7 @@ class Tracer:
             direct, indirect = np.empty((2, len(pixels), 3), np.float32)
             seeds = Seeds(pixels.astype(np.uint32), np.empty(len(pixels), np.uint32))
             for sample in range(first_sample, first_sample + samples):
-                seeds.frame[:] = 0x80000000 + sample
+                seeds.frame[:] = FIRST_SAMPLE + sample
                 self.shade(hits, seeds, view.eye, direct, indirect)
                 sums[0, part] += direct
                 sums[1, part] += indirect
@@ -300,12 +301,25 @@ class Tracer:
             if progress is not None:
                 progress(done[0] / count)
 
-        try:
+        with self._reference_numbers():
             self.for_each_tile(tile, size)
-        finally:
-            self.settings = normal
         means = (sums / samples).reshape(2, size[1], size[0], 3)
         return means[0], means[1]
+
+    def reference_frame(self, sample: int, camera: Camera, size: tuple[int, int], now: float) -> FramePacket:
+        """Sample ``sample`` of a reference, whose paths share no number with any frame's, as a frame of its own."""
+        with self._reference_numbers():
+            return self.frame(FIRST_SAMPLE + sample, camera, camera, size, now, now)
+
+    @contextmanager
+    def _reference_numbers(self) -> Iterator[None]:
+        """Meanwhile paths are drawn with uncycled hash numbers under a seed of their own."""
+        normal = self.settings
+        self.settings = replace(normal, seed=(normal.seed + REFERENCE_SEED) & 0xFFFFFFFF, generator=HASH)
+        try:
+            yield
+        finally:
+            self.settings = normal
 
     def for_each_tile(self, work: Callable[[I32], None], size: tuple[int, int]) -> float:
         """Run ``work`` on tiles of consecutive pixels; returns seconds inside Embree, averaged over the threads.

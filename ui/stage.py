@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 from raytrace.frame import FramePacket
 from raytrace.shot import FPS, Shot
+from raytrace.still import Snapshot, StillView
 from raytrace.worker import Request, Worker
 from ui.camera_control import CameraControl, HeldKeys
 from ui.state import State
@@ -27,6 +28,15 @@ class Stage:
         self._worker = Worker(shot.tracer, wake)
         self._frame = -1  # of the scene's time, traced last
         self._look = (0.0, 0.0)
+        self._moves = shot.scene.has_motion
+        self._last: StillView | None = None
+        self.resting = False
+
+    @property
+    def snapshot(self) -> Snapshot | None:
+        """The reference of the view at rest, as far as it has got; None while something moves, or nobody wants it."""
+        found = self._worker.snapshot
+        return found if self.resting and found is not None and found.view == self._last else None
 
     @property
     def idle(self) -> bool:
@@ -46,7 +56,11 @@ class Stage:
         camera = self.control.next(held.drain(time.perf_counter()), look)
         if state.animate or state.step or self._frame < 0:
             self._frame, state.step = self._frame + 1, False
-        self._worker.submit(Request(camera, size, self._frame / FPS, state.jitter, cut))
+        now = self._frame / FPS
+        view = StillView(camera, size, now if self._moves else 0.0, state.jitter)
+        self.resting, self._last = view == self._last, view
+        self._worker.accumulate(view if self.resting and state.judged else None)
+        self._worker.submit(Request(camera, size, now, state.jitter, cut))
 
     def take(self) -> FramePacket | None:
         """The frame under way, or None if it is not ready."""

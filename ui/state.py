@@ -47,7 +47,7 @@ class State:
     ``view``: name of the texture looked at, :data:`PICTURE` for none; ``look``: how it is shown; ``textures``: the
     names there are, as the last frame left them. ``split``: the noisy frame is shown to the left of the mouse.
     ``hud``: the panel is shown. ``help``: the list of keys is. ``inspect``: the numbers of the pixel under the mouse
-    are.
+    are. ``error_map``: what the picture differs from its reference by is shown instead of it, once there is one.
 
     Wishes, which whoever fulfils them takes back: ``reset``, why the next frame may use no history; ``home``, camera
     back to where it began; ``step``, one frame more of the animation; ``scene``, a scene to open, by name or path;
@@ -67,6 +67,7 @@ class State:
     hud: bool = False
     help: bool = False
     inspect: bool = False
+    error_map: bool = False
     reset: str = ""
     home: bool = False
     step: bool = False
@@ -87,6 +88,11 @@ class State:
     def section(self) -> str:
         """The configuration's section that the method shown reads; "" if it has none."""
         return {"accumulate": "svgf"}.get(self.denoiser, self.denoiser if self.denoiser in SECTIONS else "")
+
+    @property
+    def judged(self) -> bool:
+        """Whether somebody looks at the error of the picture: only then a reference is traced."""
+        return (self.hud or self.error_map) and self.denoiser != "reference"
 
     @property
     def anti_aliased(self) -> bool:
@@ -173,7 +179,7 @@ class State:
             case Action.FLIP:
                 value = not getattr(self, binding.value)
                 setattr(self, binding.value, value)
-                self.news = f"{binding.value} {'on' if value else 'off'}"
+                self.news = f"{binding.value.replace('_', ' ')} {'on' if value else 'off'}"
             case Action.RESOLUTION:
                 self.resolution += int(binding.value)
             case Action.SCREENSHOT:
