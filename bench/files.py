@@ -9,6 +9,8 @@ import math
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from bench.claims import claims
 from bench.goals import GOALS
 from bench.results import Report, contenders
@@ -37,10 +39,12 @@ def write_json(path: Path, report: Report) -> None:
 
 
 def plain(value: Any) -> Any:
-    """Dataclasses as dictionaries, without pictures; NaN and infinity as None."""
+    """Dataclasses as dictionaries, without pictures; NumPy's numbers as Python's; NaN and infinity as None."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         names = (item.name for item in dataclasses.fields(value))
         return {name: plain(getattr(value, name)) for name in names if not isinstance(getattr(value, name), Pictures)}
+    if isinstance(value, np.generic):
+        value = value.item()
     if isinstance(value, dict):
         return {key: plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):

@@ -9,7 +9,6 @@ from bench.claims import claims
 from bench.events import EventsResult
 from bench.files import plain
 from bench.goals import GOALS
-from bench.hard import hard_cases
 from bench.methods import METHODS
 from bench.oidn import INSTALL
 from bench.page.pictures import encoded
@@ -33,7 +32,7 @@ def content(report: Report) -> dict[str, Any]:
             "mapTop": MAP_TOP,
             "scenes": [_scene(result) for result in report.quality if result.trace is not None],
             "events": _events(report.events) if report.events else None,
-            "hard": hard_cases(),
+            "hard": [plain(table) for table in report.hard],
             "tracing": [_tracing(result) for result in report.tracing],
             "goals": [_goal(report, number) for number in range(len(GOALS))],
             "memory": report.memory,

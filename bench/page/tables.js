@@ -94,11 +94,12 @@ function drawEventsTable(events, names) {
 
 function drawRest() {
   const hard = DATA.hard;
-  byId("hard-section").hidden = !hard;
-  if (hard) {
+  byId("hard-section").hidden = !hard.length;
+  if (hard.length) {
     byId("hard").replaceChildren(
-      make("thead", {}, make("tr", {}, ...hard.head.map((text) => make("th", { scope: "col" }, text)))),
-      make("tbody", {}, ...hard.rows.map((row) => make("tr", {}, ...row.map((text) => make("td", {}, text))))));
+      make("thead", {}, make("tr", {}, ...hard[0].head.map((text) => make("th", { scope: "col" }, text)))),
+      ...hard.map((table) => make("tbody", {}, make("tr", { class: "group" }, make("th", { colspan: table.head.length, scope: "rowgroup" }, table.group)),
+        ...table.rows.map((row) => make("tr", {}, ...row.map((text) => make("td", { class: text === "FAILS" ? "bad" : null }, text)))))));
   }
   const unit = (g, value) => (value === null ? "–" : g.unit ? `${value.toFixed(1)} ${g.unit}` : value.toFixed(4));
   const goals = DATA.goals.filter((g) => g.value !== null);
