@@ -114,12 +114,13 @@ class State:
     def parameter(self, name: str) -> tuple[str, Param] | None:
         """Full name, ``section.key``, and metadata of a parameter; None if the method shown has none of that name.
 
-        ``name``: ``section.key``, or a key of the section that belongs to the method shown.
+        ``name``: ``section.key``, or a key of the section that belongs to the method shown; of several, ``a/b``, the
+        first that it has.
         """
-        section, _, key = name.rpartition(".")
+        section, _, keys = name.rpartition(".")
         section = section or self.section
         known = parameters(SECTIONS[section]) if section in SECTIONS else {}
-        return (f"{section}.{key}", known[key]) if key in known else None
+        return next(((f"{section}.{key}", known[key]) for key in keys.split("/") if key in known), None)
 
     def value(self, name: str) -> Any:
         """Value of the parameter ``section.key``."""
@@ -195,12 +196,12 @@ class State:
         name, _, step = binding.value.partition(" ")
         found = self.parameter(name)
         if found is None:
-            self.news = f"{self.denoiser}: has no {name.replace('_', ' ')}"
+            self.news = f"{self.denoiser}: has no {name.partition('/')[0].replace('_', ' ')}"
             return
         full, spec = found
         value = self.value(full)
         if binding.action is Action.STAGE:
-            new = 0 if value else self._counts.pop(full, spec.default)
+            new = type(spec.default)(0) if value else self._counts.pop(full, spec.default)
             if value:
                 self._counts[full] = value
         elif binding.action is Action.COUNT:
