@@ -10,11 +10,11 @@ from pathlib import Path
 
 from bench import events, files, memory, page, path_tracing, report, running, tracing
 from bench.cases import FULL, QUICK, SCORED, Case, Effort, quality_case, quick_size, tracing_cases
+from bench.hardness import hard_cases
 from bench.machine import describe
-from bench.methods import METHODS, Method
+from bench.methods import METHODS, Method, NewRenderer
 from bench.references import FOLDER, ReferenceCache
 from bench.results import QualityResult, Report, equal_samples
-from bench.running import NewRenderer
 from bench.scores import Truth
 from config import Config
 from errors import UserError
@@ -77,6 +77,7 @@ def run(
             seconds=time.perf_counter() - start - filling,
             reference_seconds=filling,
             events=happened,
+            hard=hard_cases(new_renderer, quick) if html else (),
         )
     print()
     print(report.text(result))

@@ -13,10 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assets import dynamics
-from bench.methods import Method
+from bench.methods import Method, NewRenderer
 from bench.metrics import Mask, pooled, rmse, temporal_difference
 from bench.references import Reference, ReferenceCache
-from bench.running import NewRenderer
 from config import Config
 from console import Progress
 from gl.pipelines import remembered

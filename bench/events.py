@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 
 import assets
 from bench.cases import EventEffort
-from bench.methods import METHODS, Method
+from bench.methods import METHODS, Method, NewRenderer
 from bench.metrics import Mask, rmse
 from bench.metrics_time import Deviation, recovery, steady
 from bench.references import ReferenceCache
-from bench.running import Contestant, NewRenderer, available, contestant
+from bench.running import Contestant, available, contestant
 from config import Config
 from console import Progress
 from raytrace.camera import Camera

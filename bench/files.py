@@ -9,6 +9,9 @@ import math
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from bench.claims import claims
 from bench.goals import GOALS
 from bench.results import Report, contenders
 from bench.scores import Pictures
@@ -30,15 +33,18 @@ def write_json(path: Path, report: Report) -> None:
     content = plain(report) | {"goals": plain(goals)}
     for result, written in zip(report.quality, content["quality"], strict=True):
         written["contenders"] = plain(contenders(result))
+        written["claims"] = plain(claims(result))
     text = json.dumps(content, indent=2, allow_nan=False) + "\n"
     replace_file(path, lambda target: target.write_text(text, encoding="utf-8"))
 
 
 def plain(value: Any) -> Any:
-    """Dataclasses as dictionaries, without pictures; NaN and infinity as None."""
+    """Dataclasses as dictionaries, without pictures; NumPy's numbers as Python's; NaN and infinity as None."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         names = (item.name for item in dataclasses.fields(value))
         return {name: plain(getattr(value, name)) for name in names if not isinstance(getattr(value, name), Pictures)}
+    if isinstance(value, np.generic):
+        value = value.item()
     if isinstance(value, dict):
         return {key: plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
 from config import SECTIONS, Config, apply_preset
 from gl.pipelines import DENOISERS
+from gl.renderer import Renderer
 from parameter import from_override
+
+NewRenderer = Callable[[], Renderer]
+"""Makes a renderer that is the caller's to release."""
 
 PATH_TRACING = "path tracing"
 """Name and group of the alternative to all filters: more paths in the same time."""

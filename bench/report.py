@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bench.claims import claims
 from bench.events import EventsResult
 from bench.goals import GOALS
 from bench.methods import APART_TAA, BMFR_TAA, METHODS, ONE_SIGNAL_TAA
@@ -124,6 +125,12 @@ def events_table(result: EventsResult) -> str:
     return table(heads, rows)
 
 
+def claims_table(result: QualityResult) -> str:
+    """What the filters are meant to be worth, and whether they are."""
+    rows = [(f"{c.method}: {c.what}", c.value, c.limit, "holds" if c.holds else "does not") for c in claims(result)]
+    return table((f"{result.scene}, claimed", "measured", "at least", ""), rows) if rows else ""
+
+
 def passes_table(result: QualityResult) -> str:
     """Milliseconds of every pass of the complete pipelines."""
     chosen = [m for m in result.methods if m.name in (ONE_SIGNAL_TAA.name, APART_TAA.name, BMFR_TAA.name)]
@@ -176,7 +183,7 @@ def text(report: Report) -> str:
     """The whole report for a terminal."""
     parts = [header(report), tracing_table(report.tracing)]
     for result in report.quality:
-        parts += [quality_table(result), error_table(result), passes_table(result)]
+        parts += [quality_table(result), error_table(result), claims_table(result), passes_table(result)]
     if report.events:
         parts.append(events_table(report.events))
     if len(available(METHODS)) < len(METHODS):

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from bench.events import EventsResult
+from bench.hardness import HardTable
 from bench.machine import Machine
 from bench.memory import MemoryResult
 from bench.methods import PATH_TRACING
@@ -143,3 +144,4 @@ class Report:
     seconds: float
     reference_seconds: float
     events: EventsResult | None = None
+    hard: tuple[HardTable, ...] = ()

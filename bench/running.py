@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from bench import oidn
 from bench.cases import FIRST_MEASURED, FRAMES, SCORED
-from bench.methods import METHODS, Method
+from bench.methods import METHODS, Method, NewRenderer
 from bench.scores import Errors, Pictures, Score, Truth
 from bench.timing import Summary
 from config import Config
@@ -30,8 +30,6 @@ from raytrace.frame import FramePacket
 from raytrace.shot import Shot
 
 F32 = NDArray[np.float32]
-
-NewRenderer = Callable[[], Renderer]
 
 UPLOAD = "upload"
 """What gl/renderer.py calls its first measurement of a frame."""

@@ -22,6 +22,9 @@ U8 = NDArray[np.uint8]
 SHOWN = SCORED[-1]
 """The frame whose pictures are kept."""
 
+MAP_TOP = 0.25
+"""FLIP that is the brightest in a map: in the full range, 0 to 1, filtered pictures would all be black."""
+
 FRAMES_OF_STRIP = tuple(range(FRAMES))
 """The frames of which one line of pixels is kept."""
 
@@ -54,8 +57,9 @@ class Errors:
 
 @dataclass(frozen=True)
 class Pictures:
-    """For people, row 0 at the bottom: frame :data:`SHOWN` (H, W, 3) on the display curve, its FLIP map (H, W), and one
-    line of pixels, at half the height, in every frame, (FRAMES, W, 3); black where a frame has none."""
+    """For people, row 0 at the bottom: ``picture``, frame :data:`SHOWN` (H, W, 3) on the display curve; ``flip``, its
+    FLIP map (H, W), of which :data:`MAP_TOP` becomes 255; ``strip`` (FRAMES, W, 3), one line of pixels, at half the
+    height, in every frame, black where a frame has none."""
 
     picture: U8
     flip: U8
@@ -172,7 +176,7 @@ class Score:
             self._temporal.append(temporal_difference(image, previous, truth, self._truth.radiance[before], both))
         self._last = (index, image)
         if index == SHOWN:
-            self._shown = to_display8(image), np.rint(np.clip(flips, 0.0, 1.0) * 255.0).astype(np.uint8)
+            self._shown = to_display8(image), np.rint(np.clip(flips / MAP_TOP, 0.0, 1.0) * 255.0).astype(np.uint8)
 
     def rmse(self) -> float:
         """Pooled over the frames so far."""

@@ -12,8 +12,9 @@ import itertools
 import os
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -37,8 +38,10 @@ I32 = NDArray[np.int32]
 U32 = NDArray[np.uint32]
 
 REFERENCE_SEED = 0x5EED0000
-"""Added to the run's seed for references, whose frame numbers moreover start at 2^31: they draw other numbers than any
-frame does."""
+"""Added to the run's seed for references, whose frame numbers moreover start at :data:`FIRST_SAMPLE`: they draw other
+numbers than any frame does."""
+
+FIRST_SAMPLE = 1 << 31
 
 
 _identities = itertools.count(1)
@@ -394,9 +397,6 @@ class Tracer:
         count = size[0] * size[1]
         signals = 3 if self.variant.specular else 2
         sums = np.zeros((signals, count, 3))
-        normal = self.settings
-        seed = (normal.seed + REFERENCE_SEED) & 0xFFFFFFFF
-        self.settings = replace(normal, seed=seed, generator=HASH, regularize=False)
         done = [0]
 
         def tile(pixels: I32) -> None:
@@ -405,18 +405,34 @@ class Tracer:
             sample_of = np.empty((signals, len(pixels), 3), np.float32)
             seeds = Seeds(pixels.astype(np.uint32), np.empty(len(pixels), np.uint32))
             for sample in range(first_sample, first_sample + samples):
-                seeds.frame[:] = 0x80000000 + sample
+                seeds.frame[:] = FIRST_SAMPLE + sample
                 self.shade(hits, seeds, view.eye, *sample_of, pixel=view.pixel)
                 sums[:, part] += sample_of
             done[0] += len(pixels)
             if progress is not None:
                 progress(done[0] / count)
 
-        try:
+        with self._reference_numbers():
             self.for_each_tile(tile, size)
+        return tuple((sums / samples).reshape(signals, size[1], size[0], 3))
+
+    def reference_frame(
+        self, sample: int, camera: Camera, size: tuple[int, int], now: float, lamps: float = 1.0
+    ) -> FramePacket:
+        """Sample ``sample`` of a reference, whose paths share no number with any frame's, as a frame of its own."""
+        with self._reference_numbers():
+            return self.frame(FIRST_SAMPLE + sample, camera, camera, size, now, now, lamps=lamps)
+
+    @contextmanager
+    def _reference_numbers(self) -> Iterator[None]:
+        """Meanwhile paths are drawn with uncycled hash numbers under a seed of their own, without regularisation."""
+        normal = self.settings
+        seed = (normal.seed + REFERENCE_SEED) & 0xFFFFFFFF
+        self.settings = replace(normal, seed=seed, generator=HASH, regularize=False)
+        try:
+            yield
         finally:
             self.settings = normal
-        return tuple((sums / samples).reshape(signals, size[1], size[0], 3))
 
     def for_each_tile(self, work: Callable[[I32], None], size: tuple[int, int], rows: int = 4) -> float:
         """Run ``work`` on tiles of consecutive pixels; returns seconds inside Embree, averaged over the threads.

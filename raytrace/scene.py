@@ -140,6 +140,11 @@ class Scene:
         """Whether an object or a light moves."""
         return self.has_motion or any(light.motion is not None for light in self.lights)
 
+    @property
+    def dims(self) -> bool:
+        """Whether a lamp shines more or less in time."""
+        return any(material.dimmer is not None for material in self.materials)
+
     def standing(self) -> Scene:
         """The same without motion of objects and lights, as they are at time 0."""
         meshes = tuple(mesh if mesh.motion is None else _standing(mesh) for mesh in self.meshes)

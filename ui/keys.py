@@ -93,6 +93,7 @@ BINDINGS: Final = (
     Binding(
         "I", Action.FLIP, "numbers of the pixel under the mouse: channels, history, why it was rejected", "inspect"
     ),
+    Binding("M", Action.FLIP, "error map against a reference that is traced while nothing moves", "error_map"),
     Binding("EQUAL", Action.RESOLUTION, "render more pixels", "+1"),
     Binding("MINUS", Action.RESOLUTION, "render fewer pixels", "-1"),
     Binding("G", Action.FLIP, "show or hide the panel with numbers and sliders", "hud"),

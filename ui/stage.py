@@ -9,6 +9,7 @@ from gl.pipelines import remembered
 from raytrace.camera import Camera
 from raytrace.frame import FramePacket
 from raytrace.shot import FPS, Shot
+from raytrace.still import Snapshot, StillView
 from raytrace.worker import Request, Worker
 from ui.camera_control import CameraControl, HeldKeys
 from ui.state import State
@@ -30,6 +31,15 @@ class Stage:
         self._frame = -1  # of the scene's time, traced last
         self._look = (0.0, 0.0)
         self._path: list[Camera] = []
+        self._changes = shot.scene.moves or shot.scene.scene.dims
+        self._last: StillView | None = None
+        self.resting = False
+
+    @property
+    def snapshot(self) -> Snapshot | None:
+        """The reference of the view at rest, as far as it has got; None while something moves, or nobody wants it."""
+        found = self._worker.snapshot
+        return found if self.resting and found is not None and found.view == self._last else None
 
     @property
     def idle(self) -> bool:
@@ -51,9 +61,12 @@ class Stage:
             self._path.append(camera)
         if state.animate or state.step or self._frame < 0:
             self._frame, state.step = self._frame + 1, False
+        now, lamps = self._frame / FPS, float(state.lamps)
+        view = StillView(camera, size, now if self._changes else 0.0, state.jitter, lamps)
+        self.resting, self._last = view == self._last, view
+        self._worker.accumulate(view if self.resting and state.judged else None)
         remember = remembered(state.config, state.denoiser)
-        lamps = float(state.lamps)
-        self._worker.submit(Request(camera, size, self._frame / FPS, state.jitter, cut, remember, lamps))
+        self._worker.submit(Request(camera, size, now, state.jitter, cut, remember, lamps))
 
     def take_path(self) -> list[Camera]:
         """The cameras noted since the last call, one for each frame that was begun."""

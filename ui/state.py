@@ -47,7 +47,8 @@ class State:
     ``view``: name of the texture looked at, :data:`PICTURE` for none; ``look``: how it is shown; ``textures``: the
     names there are, as the last frame left them. ``split``: the noisy frame is shown to the left of the mouse.
     ``hud``: the panel is shown. ``help``: the list of keys is. ``inspect``: the numbers of the pixel under the mouse
-    are. ``path``: the camera of every frame is noted.
+    are. ``path``: the camera of every frame is noted. ``error_map``: what the picture differs from its reference by is
+    shown instead of it, once there is one.
 
     Wishes, which whoever fulfils them takes back: ``reset``, why the next frame may use no history; ``home``, camera
     back to where it began; ``step``, one frame more of the animation; ``scene``, a scene to open, by name or path;
@@ -69,6 +70,7 @@ class State:
     help: bool = False
     inspect: bool = False
     path: bool = False
+    error_map: bool = False
     reset: str = ""
     home: bool = False
     step: bool = False
@@ -94,6 +96,11 @@ class State:
     def section(self) -> str:
         """The first of them; "" if there are none."""
         return next(iter(self.sections), "")
+
+    @property
+    def judged(self) -> bool:
+        """Whether somebody looks at the error of the picture: only then a reference is traced."""
+        return (self.hud or self.error_map) and self.denoiser != "reference"
 
     @property
     def anti_aliased(self) -> bool:
@@ -183,7 +190,7 @@ class State:
             case Action.FLIP:
                 value = not getattr(self, binding.value)
                 setattr(self, binding.value, value)
-                self.news = f"{binding.value} {'on' if value else 'off'}"
+                self.news = f"{binding.value.replace('_', ' ')} {'on' if value else 'off'}"
             case Action.RESOLUTION:
                 self.resolution += int(binding.value)
             case Action.PATH:

@@ -26,6 +26,7 @@ from ui.compiling_context import CompilingContext
 from ui.filters import Filters
 from ui.glfw_window import Cursor, DroppedFiles, Event, Exposed, Focus, Key, MouseButton, Wheel, Window
 from ui.keys import Action
+from ui.live_error import LiveError
 from ui.log import Log
 from ui.opening import Opening
 from ui.overlay import Overlay
@@ -106,6 +107,8 @@ class Viewer:
             stack.callback(self._textures.release)
             self._overlay = Overlay(window.ctx)
             stack.callback(self._overlay.release)
+            self._live = LiveError(window.ctx, window.wake)
+            stack.callback(self._live.release)
             self._stack = stack.pop_all()
         self._calibration: Calibration | None = None
         self._opening: Opening | None = None
@@ -288,6 +291,9 @@ class Viewer:
             status.bad = None
         elif packet.index % _COUNT_EVERY == 0:
             status.bad = count_bad(self._result)
+        status.resting = self.stage.resting
+        status.errors_now = self._live.update(now, self._result, self.stage.snapshot, self.state.error_map)
+        self._log.error(status.errors_now)
         status.errors = [*self._filters.errors, *filter(None, [self._refused])]
         self._log.frame(packet.index, packet.size, self._result.plan, status.errors)
         return True
@@ -296,12 +302,15 @@ class Viewer:
         """Draw the last picture, at whatever size the window now has. ``fresh``: it has not been drawn before."""
         state, screen, size = self.state, self.window.ctx.screen, self.window.framebuffer_size
         picture = result.outputs["display"]
+        if state.error_map and self._live.map is not None:
+            picture = self._live.map
         scale = size[0] / max(self.window.size[0], 1)
         column, row = int(self._cursor.x * scale), size[1] - 1 - int(self._cursor.y * scale)
         self.status.cursor = _pixel(column, row, picture.size, size)
-        looked_at = state.view != PICTURE or state.look.zoom > 0
+        looked_at = picture is not self._live.map and (state.view != PICTURE or state.look.zoom > 0)
         if not (looked_at and self._textures.draw(state, self.status, screen, size)):
-            self._presenter.draw(picture, screen, size, result.outputs.get("noisy"), column)
+            noisy = None if picture is self._live.map else result.outputs.get("noisy")
+            self._presenter.draw(picture, screen, size, noisy, column)
         self.status.progress = self._progress
         if self._overlaid:
             self._overlay.draw(self.window.size, size, self.window.content_scale, state, self.status)

@@ -1,14 +1,14 @@
 // The diagrams, by Plotly.
 
 const FONT = { family: "system-ui, -apple-system, 'Segoe UI', Roboto, Arial, sans-serif", size: 13, color: "#1d2129" };
-const CONFIG = { displaylogo: false, responsive: true, modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"] };
+const CONFIG = { displaylogo: false, responsive: true, displayModeBar: window.innerWidth < 640 ? false : "hover", modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"] };
 const AXIS = { gridcolor: "#e6e9ed", linecolor: "#b9c0ca", zeroline: false, ticks: "outside", tickcolor: "#b9c0ca", ticklen: 4 };
 const narrow = () => window.innerWidth < 640;
 
 function layout(more) {
   return {
     font: FONT, paper_bgcolor: "#fff", plot_bgcolor: "#fff", hovermode: "closest",
-    margin: narrow() ? { l: 52, r: 8, t: 8, b: 48 } : { l: 70, r: 16, t: 10, b: 52 },
+    margin: narrow() ? { l: 60, r: 8, t: 8, b: 48 } : { l: 72, r: 16, t: 10, b: 52 }, modebar: { orientation: "v", bgcolor: "transparent" },
     hoverlabel: { bgcolor: "#fff", bordercolor: "#b9c0ca", font: { ...FONT, size: 12 }, align: "left" },
     legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0, font: { size: 12 } }, ...more,
   };
@@ -78,14 +78,17 @@ function drawScatter() {
     shapes.push({ type: "line", xref: "paper", x0: 0, x1: 1, y0: floor, y1: floor, line: { color: "#b3372c", width: 1, dash: "dash" } });
     annotations.push({ xref: "paper", x: 1, xanchor: "right", y: Math.log10(floor), yanchor: "bottom", showarrow: false, text: "noise of the reference", font: { size: 11, color: "#b3372c" } });
   }
-  for (const m of methods.filter((m) => !m.stage && m.group !== "path tracing" && !narrow()))
-    annotations.push({ x: Math.log10(x(m)), y: Math.log10(y(m)), text: escaped(m.name), showarrow: false, xanchor: "left", xshift: 9, font: { size: 11, color: color(m.group) } });
+  const ranges = [methods.map(x), methods.map(y).concat(floors ? [drawn(metric, floors[metric])] : [])].map((values) => {
+    const logs = values.filter((v) => v > 0).map(Math.log10), low = Math.min(...logs), high = Math.max(...logs), pad = 0.06 * (high - low) + 0.02;
+    return [low - pad, high + pad];
+  });
+  if (!narrow()) annotations.push(...labels(methods, x, y, ranges, place));
   for (const m of methods.filter((m) => m.group === "path tracing"))
     annotations.push({ x: Math.log10(x(m)), y: Math.log10(y(m)), text: m.name.replace(" paths", ""), showarrow: false, yanchor: "bottom", yshift: 5, font: { size: 10, color: "#555" } });
   const floorValue = floors && drawn(metric, floors[metric]) > 0 ? [drawn(metric, floors[metric])] : [];
   Plotly.react(place, traces, layout({
-    xaxis: { ...AXIS, type: "log", title: { text: "ms a frame: tracing + filter" }, ...ticks(methods.map(x)) },
-    yaxis: { ...AXIS, type: "log", title: { text: METRICS[metric].title, standoff: 4 }, ...ticks(methods.map(y).concat(floorValue)) },
+    xaxis: { ...AXIS, type: "log", range: ranges[0], title: { text: "ms a frame: tracing + filter" }, ...ticks(methods.map(x)) },
+    yaxis: { ...AXIS, type: "log", range: ranges[1], title: { text: narrow() ? METRICS[metric].label : METRICS[metric].title, standoff: 4 }, ...ticks(methods.map(y).concat(floorValue)) },
     shapes, annotations,
   }), CONFIG);
   if (!place.dataset.wired) {
@@ -95,6 +98,24 @@ function drawScatter() {
   const s = scene();
   byId("scatter-say").textContent = `${s.name}, ${s.motion}, ${s.size[0]}×${s.size[1]}, against ${s.samples.toLocaleString("en")} paths per pixel. ` +
     `Tracing one path per pixel takes ${time(s.trace)} ms, each further path ${time(s.sample)} ms.`;
+}
+
+// Names beside their marks, where they hide neither another name nor a mark; the rest is told by pointing at them.
+function labels(methods, x, y, ranges, place) {
+  const wide = place.clientWidth - 88, tall = place.clientHeight - 100;
+  const px = (m) => (Math.log10(x(m)) - ranges[0][0]) / (ranges[0][1] - ranges[0][0]) * wide;
+  const py = (m) => (Math.log10(y(m)) - ranges[1][0]) / (ranges[1][1] - ranges[1][0]) * tall;
+  const taken = methods.map((m) => [px(m) - 6, py(m) - 6, px(m) + 6, py(m) + 6]), found = [];
+  const free = (b) => b[0] > 0 && b[2] < wide && taken.every((o) => b[2] < o[0] || b[0] > o[2] || b[3] < o[1] || b[1] > o[3]);
+  for (const m of methods.filter((one) => !one.stage && one.group !== "path tracing")) {
+    const w = 6.1 * m.name.length, cx = px(m), cy = py(m);
+    const spots = [["left", "middle", 9, 0, cx + 9, cy - 7], ["right", "middle", -9, 0, cx - 9 - w, cy - 7], ["center", "bottom", 0, 8, cx - w / 2, cy + 8], ["center", "top", 0, -8, cx - w / 2, cy - 22]];
+    const spot = spots.find(([, , , , left, low]) => free([left, low, left + w, low + 14]));
+    if (!spot) continue;
+    taken.push([spot[4], spot[5], spot[4] + w, spot[5] + 14]);
+    found.push({ x: Math.log10(x(m)), y: Math.log10(y(m)), text: escaped(m.name), showarrow: false, xanchor: spot[0], yanchor: spot[1], xshift: spot[2], yshift: spot[3], font: { size: 11, color: color(m.group) } });
+  }
+  return found;
 }
 
 // The four pairs of consecutive frames that have a reference.
@@ -141,7 +162,7 @@ function drawPasses() {
   const place = byId("passes");
   place.style.height = `${(narrow() ? 190 : 120) + 27 * methods.length}px`;
   Plotly.react(place, traces, layout({
-    barmode: "stack", bargap: 0.28, margin: { l: narrow() ? 112 : 205, r: 12, t: 8, b: 46 },
+    barmode: "stack", bargap: 0.28, legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0, font: { size: 12 }, traceorder: "normal" }, margin: { l: narrow() ? 112 : 205, r: 12, t: 8, b: 46 },
     xaxis: { ...AXIS, title: { text: "ms" } }, yaxis: { automargin: false, tickfont: { size: narrow() ? 10 : 12 } },
   }), CONFIG);
 }

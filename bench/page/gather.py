@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from typing import Any
 
+from bench.cases import SCORED
+from bench.claims import claims
 from bench.events import EventsResult
 from bench.files import plain
 from bench.goals import GOALS
-from bench.hard import hard_cases
 from bench.methods import METHODS
 from bench.oidn import INSTALL
 from bench.page.pictures import encoded
 from bench.results import Contender, QualityResult, Report, contenders
 from bench.running import MethodResult, available
-from bench.scores import FRAMES_OF_STRIP, SHOWN, Errors
+from bench.scores import FRAMES_OF_STRIP, MAP_TOP, SHOWN, Errors
 from bench.tracing import TracingResult
 
 
@@ -28,9 +29,10 @@ def content(report: Report) -> dict[str, Any]:
             "seconds": report.seconds,
             "referenceSeconds": report.reference_seconds,
             "notes": _notes(report),
+            "mapTop": MAP_TOP,
             "scenes": [_scene(result) for result in report.quality if result.trace is not None],
             "events": _events(report.events) if report.events else None,
-            "hard": hard_cases(),
+            "hard": [plain(table) for table in report.hard],
             "tracing": [_tracing(result) for result in report.tracing],
             "goals": [_goal(report, number) for number in range(len(GOALS))],
             "memory": report.memory,
@@ -64,6 +66,8 @@ def _scene(result: QualityResult) -> dict[str, Any]:
         "floors": _errors(result.floors) if result.floors else None,
         "shown": SHOWN,
         "stripFrames": list(FRAMES_OF_STRIP),
+        "scored": list(SCORED),
+        "claims": [plain(claim) for claim in claims(result)],
         "truth": encoded(result.truth) if result.truth else None,
         "methods": [_contender(c, methods.get(c.name)) for c in contenders(result)],
     }

@@ -11,6 +11,7 @@ function drawHead() {
   byId("machine").textContent = `${m.renderer} (OpenGL ${m.opengl}) · ${m.cpu}, ${m.threads} threads · ${m.system} · Python ${m.python}, ${packages} · ` +
     `presets ${DATA.preset.svgf} (SVGF) and ${DATA.preset.bmfr} (BMFR) unless said otherwise, seed ${DATA.seed} · ${m.date.slice(0, 16).replace("T", " ")} · measured in ${(DATA.seconds / 60).toFixed(1)} min`;
   byId("notes").replaceChildren(...DATA.notes.map((note) => make("p", { class: "note" }, note)));
+  byId("map-top").textContent = `${DATA.mapTop} FLIP and more`;
   byId("metric-choice").replaceChildren(...Object.entries(METRICS).map(([name, metric]) => make("option", { value: name }, metric.label)));
   byId("metric-choice").onchange = (event) => { state.metric = event.target.value; changed(); };
   byId("stage-choice").onchange = (event) => { state.stages = event.target.checked; changed(); };
@@ -28,7 +29,7 @@ async function start() {
   drawHead();
   drawRest();
   viewer.start();
-  state.listeners = [drawTable];
+  state.listeners = [drawTable, drawClaims];
   if (DATA.scenes.length) chooseScene(0);
   try {
     const script = document.createElement("script");
@@ -38,7 +39,7 @@ async function start() {
     byId("scatter").replaceChildren(make("p", { class: "failed" }, `This browser cannot unpack the diagrams (${error}); tables and pictures work.`));
     return;
   }
-  state.listeners = [drawScatter, drawFrames, drawTable, drawEvents];
+  state.listeners = [drawScatter, drawFrames, drawTable, drawClaims, drawEvents];
   if (DATA.scenes.length) { drawPasses(); changed(); }
   document.body.dataset.ready = "1";
 }

@@ -67,6 +67,17 @@ function drawTable() {
     "Variants with anti-aliasing do not compete: it comes after what errors are taken of.";
 }
 
+function drawClaims() {
+  sortable(byId("claims"), [
+    { head: "method", value: (c) => c.method, text: (c) => c.method },
+    { head: scene().name, value: (c) => c.what, cell: (cell, c) => { cell.textContent = c.what; cell.style.textAlign = "left"; } },
+    { head: "measured", value: (c) => Number(c.value) || 0, text: (c) => c.value },
+    { head: "at least", value: (c) => c.limit, text: (c) => c.limit },
+    { head: "", value: (c) => Number(c.holds), cell: (cell, c) => { cell.textContent = c.holds ? "holds" : "does not hold"; cell.className = c.holds ? "good" : "bad"; } },
+  ], scene().claims, { column: null, down: false });
+  byId("claims-section").hidden = !scene().claims.length;
+}
+
 function drawEventsTable(events, names) {
   const columns = [
     { head: "method", value: (r) => r.name, cell: named },
@@ -83,11 +94,12 @@ function drawEventsTable(events, names) {
 
 function drawRest() {
   const hard = DATA.hard;
-  byId("hard-section").hidden = !hard;
-  if (hard) {
+  byId("hard-section").hidden = !hard.length;
+  if (hard.length) {
     byId("hard").replaceChildren(
-      make("thead", {}, make("tr", {}, ...hard.head.map((text) => make("th", { scope: "col" }, text)))),
-      make("tbody", {}, ...hard.rows.map((row) => make("tr", {}, ...row.map((text) => make("td", {}, text))))));
+      make("thead", {}, make("tr", {}, ...hard[0].head.map((text) => make("th", { scope: "col" }, text)))),
+      ...hard.map((table) => make("tbody", {}, make("tr", { class: "group" }, make("th", { colspan: table.head.length, scope: "rowgroup" }, table.group)),
+        ...table.rows.map((row) => make("tr", {}, ...row.map((text) => make("td", { class: text === "FAILS" ? "bad" : null }, text)))))));
   }
   const unit = (g, value) => (value === null ? "–" : g.unit ? `${value.toFixed(1)} ${g.unit}` : value.toFixed(4));
   const goals = DATA.goals.filter((g) => g.value !== null);

@@ -8,6 +8,7 @@ import numpy as np
 
 from bench.cases import FRAMES, SCORED
 from bench.events import EventResult, EventsResult
+from bench.hardness import HardTable
 from bench.machine import describe
 from bench.memory import MemoryResult
 from bench.methods import APART, BMFR, BMFR_TAA, METHODS, NOISY, Method
@@ -107,5 +108,6 @@ def report(*scenes: str) -> Report:
         memory=MemoryResult("cornell", SIZE, 200, 1000, 250.0, 256.5),
         seconds=12.0,
         reference_seconds=34.0,
+        hard=(HardTable("light", ("case", "found", ""), (("all black", "0", ""), ("firefly", "1e5", "FAILS"))),),
         events=EventsResult("cornell", SIZE, (4, 12), 128, dict.fromkeys(names, 0.001), seen, 1.0),
     )

@@ -12,7 +12,6 @@ from typing import Any
 import pytest
 
 from bench import page
-from bench.page import gather
 from bench.page.gather import content
 from tests.page.browser import Browser, browser, middle, require_browser
 from tests.page.sample import report
@@ -88,10 +87,10 @@ def test_the_content_is_json_without_holes():
     assert math.isclose(by_name["BMFR"]["ms"], 50.0)
 
 
-def test_hard_cases_are_shown_where_there_are_some(monkeypatch):
-    table = {"head": ["case", "found"], "rows": [["all black", "0"]]}
-    monkeypatch.setattr(gather, "hard_cases", lambda: table)
-    assert content(report())["hard"] == table
+def test_hard_cases_are_shown_in_groups(shown):
+    rows = shown.run("return [...document.querySelectorAll('#hard tbody tr')].map(r => r.innerText.trim())")
+    assert rows == ["light", "all black\t0", "firefly\t1e5\tFAILS"]
+    assert shown.run("return document.querySelector('#hard td.bad').textContent") == "FAILS"
 
 
 # --------------------------------------------------------------------------------------------------- in a browser

@@ -98,7 +98,9 @@ def test_path_tracing_gets_the_same_time(quick):
     assert errors == sorted(errors, reverse=True)
     assert traced[1]["errors"]["rmse"] == pytest.approx(quality["methods"][0]["rmse"], rel=0.15)
     most = max(traced)
-    assert traced[most]["errors"]["rmse"] == pytest.approx(errors[0] / math.sqrt(most), rel=0.25)
+    # The reference is noisy, too.
+    expected = math.hypot(errors[0] / math.sqrt(most), quality["noise"])
+    assert traced[most]["errors"]["rmse"] == pytest.approx(expected, rel=0.25)
     for contender in quality["contenders"][1 : len(MEASURED)]:
         equal = traced[contender["equal"]["samples"]]
         spent = contender["filter_milliseconds"] - quality["methods"][0]["milliseconds"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,6 +16,7 @@ from raytrace.compiled import compile_scene
 from raytrace.frame import FramePacket
 from raytrace.integrator import Settings, Tracer
 from raytrace.shot import FPS, Shot, jitter_of
+from raytrace.still import Snapshot, StillView
 from raytrace.worker import Request, Worker
 
 SIZE = (4, 3)
@@ -45,6 +47,8 @@ class FakeTracer:
         self.gate = threading.Event()
         self.gate.set()
         self.error: BaseException | None = None
+        self.samples: list[tuple[int, Camera, tuple[int, int], float]] = []
+        self.sample_error: BaseException | None = None
 
     def frame(self, *args: Any, **kwargs: Any) -> FramePacket:
         call = Call(*args, **kwargs)
@@ -57,6 +61,17 @@ class FakeTracer:
         image = np.zeros((call.size[1], call.size[0], 4), np.float32)
         gradient = np.zeros((call.size[1], call.size[0], 2), np.float32)
         return FramePacket(call.index, call.now, image, image, image, image, image, gradient, image, cut=call.cut)
+
+    def reference_frame(
+        self, sample: int, camera: Camera, size: tuple[int, int], now: float, lamps: float
+    ) -> FramePacket:
+        if self.sample_error is not None:
+            error, self.sample_error = self.sample_error, None
+            raise error
+        self.samples.append((sample, camera, size, now))
+        image = np.full((size[1], size[0], 4), 1.0 + sample, np.float32)
+        zero = np.zeros_like(image)
+        return FramePacket(sample, now, image, zero, np.ones_like(image), zero, zero, zero[..., :2], zero)
 
 
 def at(x: float) -> Camera:
@@ -183,3 +198,95 @@ def test_the_same_frames_as_without_a_thread():
         assert one.cut == other.cut
         for name in ("direct", "indirect", "surface", "motion", "prev_normal"):
             np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)
+
+
+# ------------------------------------------------------------------------------------------- the view's own reference
+
+VIEW = StillView(CAMERA, SIZE, 0.0, False)
+
+
+def samples_of(worker: Worker, count: int) -> Snapshot:
+    """The reference, once it has ``count`` samples."""
+    end = time.monotonic() + 10.0
+    while (snapshot := worker.snapshot) is None or snapshot.samples < count:
+        assert time.monotonic() < end
+        time.sleep(0.001)
+    return snapshot
+
+
+def next_frame(worker: Worker) -> None:
+    worker.submit(Request(CAMERA, SIZE))
+    assert worker.take(timeout=10.0) is not None
+
+
+def test_a_reference_grows_while_no_frame_is_wanted():
+    tracer = FakeTracer()
+    with Worker(tracer) as worker:
+        worker.accumulate(VIEW)
+        next_frame(worker)
+        snapshot = samples_of(worker, 5)
+    assert [sample for sample, *_ in tracer.samples[:5]] == [0, 1, 2, 3, 4]
+    assert tracer.samples[0][1:] == (CAMERA, SIZE, 0.0)
+    np.testing.assert_allclose(snapshot.radiance, (snapshot.samples + 1) / 2)  # of 1, 2, 3, ...
+
+
+def test_a_reference_gets_its_turn_however_busy_the_worker_is():
+    tracer = FakeTracer()
+    with Worker(tracer) as worker:
+        worker.accumulate(VIEW)
+        for _ in range(24):
+            next_frame(worker)
+        assert len(tracer.samples) >= 24 // 3 - 1
+
+
+def test_another_view_begins_anew_and_none_forgets():
+    tracer = FakeTracer()
+    with Worker(tracer) as worker:
+        worker.accumulate(VIEW)
+        next_frame(worker)
+        samples_of(worker, 3)
+        other = replace(VIEW, camera=at(1.0))
+        worker.accumulate(other)
+        next_frame(worker)
+        end = time.monotonic() + 10.0
+        while samples_of(worker, 1).view != other:
+            assert time.monotonic() < end
+        assert next(sample for sample, camera, *_ in tracer.samples if camera == other.camera) == 0
+        worker.accumulate(None)
+        for _ in range(2):
+            next_frame(worker)
+        assert worker.snapshot is None
+        count = len(tracer.samples)
+        next_frame(worker)
+        assert len(tracer.samples) == count
+
+
+def test_trouble_with_the_reference_is_raised_with_the_next_frame():
+    tracer = FakeTracer()
+    with Worker(tracer) as worker:
+        tracer.sample_error = MemoryError("too large")
+        worker.accumulate(VIEW)
+
+        def until_trouble() -> None:
+            for _ in range(6):
+                next_frame(worker)
+
+        with pytest.raises(MemoryError, match="too large"):
+            until_trouble()
+        next_frame(worker)
+
+
+def test_frames_do_not_depend_on_the_reference_between_them():
+    scene = compile_scene(assets.build("cornell"))
+    pictures = []
+    for wanted in (None, StillView(scene.scene.camera, (16, 9), 0.0, True)):
+        with Tracer(scene, Settings(threads=1)) as tracer, Worker(tracer) as worker:
+            worker.accumulate(wanted)
+            for _ in range(4):
+                worker.submit(Request(scene.scene.camera, (16, 9)))
+                packet = worker.take(timeout=None)
+                if wanted is not None:
+                    samples_of(worker, 1)
+            assert packet is not None
+            pictures.append(packet.radiance())
+    np.testing.assert_array_equal(pictures[0], pictures[1])
