@@ -421,6 +421,7 @@ def replay_parser() -> Parser:
     parser.add_argument(
         "--window", action="store_true", help="play them in the window, again and again; writes nothing"
     )
+    parser.add_argument("--log", action="store_true", help="with --window: print what changes in it")
     _add_settings(parser)
     return parser
 

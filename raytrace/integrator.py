@@ -186,6 +186,13 @@ class Tracer:
             self._pool.shutdown()
         self.rays.close()
 
+    def carry_positions(self, wanted: bool) -> None:
+        """Whether frames from now on have world positions, whatever the settings said; not while one is traced."""
+        if wanted != self.settings.positions:
+            self.settings = replace(self.settings, positions=wanted)
+            self.images = images_of(self.variant, wanted)
+            self._guides = guide_kernel(self.variant, wanted)
+
     def warm_up(self) -> None:
         """Compile, or load from the disk cache, every kernel that frames of this scene need."""
         camera = self.scene.scene.camera

@@ -36,6 +36,8 @@ class Action(Enum):
     PATH = auto()
     """Note the camera of every frame from now on, or stop and write what was noted."""
     SCREENSHOT = auto()
+    RECORD = auto()
+    """Record the frames shown, or stop recording."""
     BACK = auto()
     """Let go of the mouse or, if it is free, close the window."""
     FLY = auto()
@@ -98,6 +100,7 @@ BINDINGS: Final = (
     Binding("MINUS", Action.RESOLUTION, "render fewer pixels", "-1"),
     Binding("G", Action.FLIP, "show or hide the panel with numbers and sliders", "hud"),
     Binding("K", Action.FLIP, "show or hide this list of keys", "help"),
+    Binding("F11", Action.RECORD, "record the frames to a folder recording_NNN; once more: stop"),
     Binding("F12", Action.SCREENSHOT, "save the picture as shot_NNN.png"),
     Binding("ESCAPE", Action.BACK, "let go of the mouse; otherwise quit"),
     Binding("W", Action.FLY, "fly forward", "forward"),

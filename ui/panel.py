@@ -37,6 +37,7 @@ _ICONS: Final[dict[Action, Callable[[State], str]]] = {
     Action.RESET_HISTORY: lambda _: "\uf12d",
     Action.RESET_CAMERA: lambda _: "\uf015",
     Action.SCREENSHOT: lambda _: "\uf030",
+    Action.RECORD: lambda state: "\uf04d" if state.recording else "\uf111",
 }
 
 

@@ -54,7 +54,8 @@ class State:
     back to where it began; ``step``, one frame more of the animation; ``scene``, a scene to open, by name or path;
     ``next_scene``; ``resolution``, rungs of the ladder to climb; ``screenshot``; ``closing``.
 
-    ``looking``: the mouse turns the camera. ``news``: one line about the last thing done, "" once it was shown.
+    ``recording``: the frames shown are recorded. ``looking``: the mouse turns the camera. ``news``: one line about the
+    last thing done, "" once it was shown.
     """
 
     config: Config
@@ -79,6 +80,7 @@ class State:
     resolution: int = 0
     screenshot: bool = False
     closing: bool = False
+    recording: bool = False
     looking: bool = False
     news: str = ""
     _counts: dict[str, Value] = field(default_factory=dict)
@@ -198,6 +200,8 @@ class State:
                 self.news = "recording the camera's path" if self.path else ""
             case Action.SCREENSHOT:
                 self.screenshot = True
+            case Action.RECORD:
+                self.recording = not self.recording
             case Action.BACK:
                 self.closing = not self.looking
                 self.looking = False

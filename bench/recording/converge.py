@@ -17,7 +17,8 @@ from bench.references import Reference, load, save, temporal_noise
 from console import Progress
 from raytrace.camera import Camera
 from raytrace.frame import FramePacket
-from raytrace.shot import Shot
+from raytrace.shot import Shot, jitter_of
+from storage import uninterrupted
 
 SUMS: Final = ".references"
 """Folder of the sums that references are made of: with them they are refined, not traced again."""
@@ -31,8 +32,14 @@ def surfaces(packet: FramePacket) -> Mask:
     return np.asarray(packet.emission[..., :3].max(axis=2) == 0.0)
 
 
-def run(recording: Recording, shot: Shot, cameras: list[Camera], samples: int) -> None:
-    """Bring the references of all frames to ``samples`` paths per pixel, and tell how noisy they still are.
+def camera_of(shot: Shot, index: int, jitter: bool) -> Camera:
+    """Camera of a frame; ``jitter``: with that which the frame is traced with."""
+    camera = shot.camera(index)
+    return camera.with_jitter(jitter_of(index)) if jitter else camera
+
+
+def run(recording: Recording, shot: Shot, frames: int, jitter: bool, samples: int) -> None:
+    """Bring the references of the first ``frames`` to ``samples`` paths per pixel, and tell how noisy they still are.
 
     Round by round: after an interruption all frames have references of about the same quality. Raises UserError where
     they cannot be written.
@@ -40,13 +47,13 @@ def run(recording: Recording, shot: Shot, cameras: list[Camera], samples: int) -
     recording.flush()
     sequence = open_sequence(recording.folder)
     notes = recording.extra.setdefault("references", {})
-    counts = {index: _load(sequence, index).samples for index in range(len(cameras))}
+    counts = {index: _load(sequence, index).samples for index in range(frames)}
     width, height = shot.size
     # A reference needs two slices at least to know its noise.
     step = max(1, min(PATHS_AT_ONCE // (width * height), -(-samples // 2)))
     missing = sum(max(0, samples - count) for count in counts.values())
     done = 0
-    with Progress(f"{shot.scene.scene.name}: {len(cameras)} references of {samples} paths per pixel") as progress:
+    with Progress(f"{shot.scene.scene.name}: {frames} references of {samples} paths per pixel") as progress:
         while waiting := [index for index, count in counts.items() if count < samples]:
             # Those that lag behind are led up to the others first.
             least = min(counts[index] for index in waiting)
@@ -58,12 +65,13 @@ def run(recording: Recording, shot: Shot, cameras: list[Camera], samples: int) -
 
                 reference = _load(sequence, index)
                 means = shot.tracer.reference(
-                    cameras[index], shot.size, count, shot.time(index), reference.samples, advance
+                    camera_of(shot, index, jitter), shot.size, count, shot.time(index), reference.samples, advance
                 )
                 reference = reference.plus(means[0] + means[1], count)
-                save(sums_path(recording.folder, index), reference)
-                _publish(sequence, index, reference, notes)
-                recording.save_notes()
+                with uninterrupted():
+                    save(sums_path(recording.folder, index), reference)
+                    _publish(sequence, index, reference, notes)
+                    recording.save_notes()
                 counts[index] = reference.samples
                 done += count
     _finish(recording, sequence, notes)

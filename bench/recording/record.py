@@ -9,20 +9,23 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from bench.recording import converge
+from bench.recording.converge import camera_of
 from bench.recording.layout import IMAGES
-from bench.recording.view import matrix_of
+from bench.recording.sequence import read_notes
 from bench.recording.writer import Recording, Stage, open_recording
 from bench.references import ReferenceCache
 from config import Config
 from console import Progress
 from errors import UserError
-from raytrace.camera import Camera
-from raytrace.shot import Shot, jitter_of
+from raytrace.shot import Shot
 from session import open_shot
-from storage import require_writable
+from storage import require_writable, uninterrupted
+
+COMPRESSED: Final = 0.3
+"""Least share of their bytes that compressed images take."""
 
 
 @dataclass(frozen=True)
@@ -54,21 +57,15 @@ class RecordJob:
 def run(job: RecordJob, config: Config) -> None:
     """Record what is not recorded yet; prints the folder's name. Raises UserError for what cannot be had or written."""
     require_writable(job.out / ".probe")
+    _require_space(job, (config.render.width, config.render.height))
     shot = open_shot(job.scene, config, job.camera, job.animate, job.jitter, positions=True)
     with shot.tracer:
-        cameras = [camera_of(shot, index, job.jitter) for index in range(job.frames)]
-        recording = _open(job, config, shot, cameras)
+        recording = _open(job, config, shot)
         with _kept(recording):
-            _record(recording, shot, cameras)
+            _record(job, recording, shot)
             if job.samples:
-                converge.run(recording, shot, cameras, job.samples)
+                converge.run(recording, shot, job.frames, job.jitter, job.samples)
     print(job.out)
-
-
-def camera_of(shot: Shot, index: int, jitter: bool) -> Camera:
-    """Camera of a frame, with the jitter it is traced with."""
-    camera = shot.camera(index)
-    return camera.with_jitter(jitter_of(index)) if jitter else camera
 
 
 def about(shot: Shot, camera: str | None, seed: int) -> dict[str, Any]:
@@ -82,24 +79,21 @@ def about(shot: Shot, camera: str | None, seed: int) -> dict[str, Any]:
     }
 
 
-def _open(job: RecordJob, config: Config, shot: Shot, cameras: list[Camera]) -> Recording:
-    origin = shot.scene.origin
-    stage = Stage(origin, shot.scene.extent, about(shot, job.camera, config.render.seed) | {"animate": job.animate})
-    matrices = [matrix_of(camera, shot.size, origin) for camera in cameras]
-    offsets = [(0.5 + camera.jitter[0], 0.5 + camera.jitter[1]) for camera in cameras]
-    recording = open_recording(job.out, stage, matrices, offsets)
-    _require_space(job, shot, len(cameras) - recording.frames)
-    return recording
+def _open(job: RecordJob, config: Config, shot: Shot) -> Recording:
+    noted = about(shot, job.camera, config.render.seed) | {"animate": job.animate}
+    stage = Stage(shot.scene.origin, shot.scene.extent, noted)
+    return open_recording(job.out, stage, lambda index: camera_of(shot, index, job.jitter), shot.size)
 
 
-def _require_space(job: RecordJob, shot: Shot, frames: int) -> None:
+def _require_space(job: RecordJob, size: tuple[int, int]) -> None:
     """Raises UserError where the frames will not fit: better now than after an hour."""
+    frames = max(0, job.frames - len(read_notes(job.out).get("footprints", [])))
     channels = sum(image.channels for image in IMAGES.values() if not image.sparse)
-    needed = frames * shot.size[0] * shot.size[1] * channels * 4 * 0.5  # they are compressed: half is little
+    needed = frames * size[0] * size[1] * channels * 4 * COMPRESSED
     free = shutil.disk_usage(job.out).free
     if needed > free:
         raise UserError(
-            f"{job.out}: {frames} frames of {shot.size[0]}x{shot.size[1]} need {needed / 1e9:.1f} GB or more, "
+            f"{job.out}: {frames} frames of {size[0]}x{size[1]} need {needed / 1e9:.1f} GB or more, "
             f"{free / 1e9:.1f} GB are free",
             "choose another place with --out, fewer --frames or a smaller --size",
         )
@@ -117,11 +111,15 @@ def _kept(recording: Recording) -> Iterator[None]:
         recording.flush()
 
 
-def _record(recording: Recording, shot: Shot, cameras: list[Camera]) -> None:
-    first, count = recording.frames, len(cameras)
+def _record(job: RecordJob, recording: Recording, shot: Shot) -> None:
+    first, count = recording.frames, job.frames
     if first:
-        print(f"{recording.folder}: {first} frames are there already", file=sys.stderr)
+        print(
+            f"{recording.folder}: {first} {'frame is' if first == 1 else 'frames are'} there already", file=sys.stderr
+        )
     with Progress(f"{shot.scene.scene.name}: recording {count} frames") as progress:
         for index in range(first, count):
-            recording.add(shot.frame(index), cameras[index])
+            packet = shot.frame(index)
+            with uninterrupted():
+                recording.add(packet, camera_of(shot, index, job.jitter))
             progress.update((index + 1 - first) / (count - first))

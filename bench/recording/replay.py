@@ -36,11 +36,12 @@ class ReplayJob:
     denoiser: str
     frames: tuple[int | None, int | None]
     out: Path
+    log: bool = False
 
     @staticmethod
     def of(args: argparse.Namespace) -> ReplayJob:
         """From the parsed command line."""
-        return ReplayJob(folder=args.folder, denoiser=args.denoiser, frames=args.frames, out=args.out)
+        return ReplayJob(args.folder, args.denoiser, args.frames, args.out, args.log)
 
 
 def selected(sequence: Sequence, frames: tuple[int | None, int | None]) -> range:
@@ -65,14 +66,18 @@ def suited(sequence: Sequence, config: Config) -> Config:
     return replace(config, svgf=replace(config.svgf, separate=False))
 
 
+def prepare(job: ReplayJob, config: Config) -> tuple[Sequence, range, Config]:
+    """The sequence, the frames of it that are wanted, and the parameters that suit it. Raises UserError."""
+    sequence = open_sequence(job.folder)
+    return sequence, selected(sequence, job.frames), suited(sequence, config)
+
+
 def run(job: ReplayJob, config: Config) -> None:
     """Filter the frames and write them, their times and errors to ``job.out``; prints what was written."""
-    sequence = open_sequence(job.folder)
-    frames = selected(sequence, job.frames)
+    sequence, frames, config = prepare(job, config)
     if job.out.resolve() == job.folder.resolve():
         raise UserError(f"--out {job.out}: is the recording itself", "choose another folder")
     require_writable(job.out / "timings.json")
-    config = suited(sequence, config)
     scores = Scores(sequence.notes.get("references", {}))
     times: list[dict[str, Any]] = []
     with ExitStack() as stack:

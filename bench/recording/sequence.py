@@ -26,6 +26,7 @@ F32 = NDArray[np.float32]
 REFERENCE: Final = "reference"
 
 _NUMBERED = re.compile(r"(?P<name>[A-Za-z_]\w*?)(?P<number>\d+)\.exr")
+_PROBES: Final = 4096  # pixels that a camera is tried on
 _FARTHEST: Final = 0.05  # of the picture's diagonal: what is farther off its pixel belongs to another camera
 
 _identities = itertools.count(2)
@@ -76,19 +77,18 @@ class Sequence:
             require_finite(path, values)
         return values
 
-    def packet(self, index: int, cut: bool = False, still: bool = False) -> FramePacket:
-        """Frame ``index``. ``cut``: it does not continue the one before. ``still``: it follows itself, as when paused.
+    def packet(self, index: int, cut: bool = False) -> FramePacket:
+        """Frame ``index``. ``cut``: it does not continue the one before.
 
         Raises UserError where one of its files cannot be used.
         """
-        images = {name: self.read(name, index) for name in self.images}
-        if still:
-            images.pop("prev_position", None)
+        unused = {"color"} if self.separate else set()
+        images = {name: self.read(name, index) for name in self.images if name not in unused}
         path = IMAGES["world_position"].path(self.folder, index)
         surface = np.asarray(np.square(images["shading_normal"]).sum(axis=2, keepdims=True) > MISS_BELOW)
         require_finite(path, np.where(surface, images["world_position"], np.float32(0.0)))
         view = self.view(index)
-        before = view if still or cut else self.view(max(index - 1, 0))
+        before = view if cut else self.view(max(index - 1, 0))
         packet = packet_of(index, images, view, before, cut, self.name, self.scene_id)
         _require_camera(path, packet, images["world_position"], view)
         return packet
@@ -153,8 +153,8 @@ def read_notes(folder: Path) -> dict[str, Any]:
 
 def require_finite(path: Path, values: F32) -> None:
     """Raises UserError where a pixel of ``values`` (H, W, C), row 0 at the bottom, is NaN or infinite."""
-    bad = np.asarray(~np.isfinite(values).all(axis=2))
-    if bad.any():
+    if not np.isfinite(values).all():
+        bad = np.asarray(~np.isfinite(values).all(axis=2))
         rows, columns = np.nonzero(bad[::-1])
         raise UserError(
             f"{path}: NaN or infinite at {len(rows)} {'pixel' if len(rows) == 1 else 'pixels'}, the first in column "
@@ -182,7 +182,7 @@ def _require_numbers(folder: Path, image: Image, numbers: list[int], frames: int
         raise UserError(
             f"{folder}: {image.name}{extra[0]}.exr has no camera: {HEADER} has those of frames 0 to {frames - 1}"
             + (f" (more without one: {span(extra[1:])})" if extra[1:] else ""),
-            "a recording that was interrupted is completed by the same app.py record again",
+            "remove what is too much; a recording that was interrupted is completed by the same app.py record again",
         )
     missing = sorted(set(range(frames)) - set(numbers))
     if missing and not image.sparse:
@@ -219,10 +219,9 @@ def _require_camera(path: Path, packet: FramePacket, position: F32, view: View) 
     hit = packet.motion[..., 3] >= 0.0
     if not hit.any():
         return
-    points = position[hit][None]
+    rows, columns = (numbers[:: len(numbers) // _PROBES + 1] for numbers in np.nonzero(hit))
     with np.errstate(all="ignore"):
-        x, y, w = view.project(points)
-        rows, columns = np.nonzero(hit)
+        x, y, w = view.project(position[rows, columns][None])
         width, height = view.size
         dx = (x[0] / w[0] + 1.0) * width / 2 - columns - 0.5 - view.jitter[0]
         dy = (y[0] / w[0] + 1.0) * height / 2 - rows - 0.5 - view.jitter[1]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -63,16 +63,22 @@ class Recording:
         return len(self.matrices)
 
     def add(self, packet: FramePacket, camera: Camera) -> None:
-        """Write the next frame, seen by ``camera``. Raises UserError where it cannot be written."""
+        """Write the next frame, seen by ``camera``, or nothing of it. Raises UserError where it cannot be written."""
         index = self.frames
         eye = np.asarray(camera.position) - self.stage.origin
-        for name, values in images_of(packet, eye, self.stage.extent).items():
-            exr.write(IMAGES[name].path(self.folder, index), values)
+        images = images_of(packet, eye, self.stage.extent)
+        try:
+            for name, values in images.items():
+                exr.write(IMAGES[name].path(self.folder, index), values)
+        except BaseException:
+            for name in images:
+                IMAGES[name].path(self.folder, index).unlink(missing_ok=True)
+            raise
         depth = packet.surface[..., 3]
         seen = depth[depth > 0.0]
         self.footprints.append(float(np.median(seen)) * packet.pixel_size if seen.size else 0.0)
         self.matrices.append(matrix_of(camera, packet.size, self.stage.origin))
-        self.offsets.append((0.5 + packet.jitter[0], 0.5 + packet.jitter[1]))
+        self.offsets.append(_offset(packet.jitter))
         if packet.cut:
             self.cuts.append(index)
         if time.monotonic() - self._written > _HEADER_EVERY:
@@ -102,6 +108,11 @@ class Recording:
         replace_file(self.folder / NOTES, lambda target: target.write_text(text, encoding="utf-8"))
 
 
+def _offset(jitter: tuple[float, float]) -> tuple[float, float]:
+    """Where in its pixel a ray passes, from the lower left corner."""
+    return 0.5 + jitter[0], 0.5 + jitter[1]
+
+
 def _comment(stage: Stage) -> list[str]:
     x, y, z = (repr(float(c)) for c in stage.origin)
     return [
@@ -112,12 +123,10 @@ def _comment(stage: Stage) -> list[str]:
     ]
 
 
-def open_recording(
-    folder: Path, stage: Stage, matrices: Sequence[F32], offsets: Sequence[tuple[float, float]]
-) -> Recording:
+def open_recording(folder: Path, stage: Stage, camera: Callable[[int], Camera], size: tuple[int, int]) -> Recording:
     """The recording in ``folder``, to be gone on with; a new one where nothing is.
 
-    ``matrices``, ``offsets``: those that its first frames must have. Raises UserError where ``folder`` holds anything
+    ``camera``: frame number -> the camera that the frame must have. Raises UserError where ``folder`` holds anything
     else, which is left alone.
     """
     if folder.exists() and not folder.is_dir():
@@ -142,9 +151,10 @@ def open_recording(
             )
     footprints, header = notes.get("footprints", []), read_header(folder / HEADER)
     count = min(len(footprints), header.frames)
-    for index in range(min(count, len(matrices))):
-        same = np.array_equal(header.matrices[index], matrices[index])
-        if not same or not np.array_equal(header.offsets[index], np.array(offsets[index], np.float32)):
+    for index in range(count):
+        expected = camera(index)
+        same = np.array_equal(header.matrices[index], matrix_of(expected, size, stage.origin))
+        if not same or not np.array_equal(header.offsets[index], np.array(_offset(expected.jitter), np.float32)):
             raise UserError(
                 f"{folder}: holds another recording: the camera of frame {index} is another one",
                 "choose another folder with --out, or remove that one",

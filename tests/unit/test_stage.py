@@ -25,6 +25,10 @@ class Notes:
     def __init__(self) -> None:
         self.frames: list[SimpleNamespace] = []
         self.closed = False
+        self.positions = False
+
+    def carry_positions(self, wanted: bool) -> None:
+        self.positions = wanted
 
     def frame(
         self, index: int, camera: Camera, previous: Camera, size: Any, now: float, before: float, cut: bool, **how: Any
