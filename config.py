@@ -114,7 +114,9 @@ class Bmfr(Section):
     preset: str = param(
         "best", choices=("paper", "reference", "best"), doc="values for the keys of this section that are not set"
     )
-    max_history: int = param(255, 10, 255, "[10;255] longest history counted, in frames", heading="accumulation")
+    demodulate: bool = param(True, doc="fit illumination, without the surfaces' albedo", structural=True)
+    temporal: bool = param(True, doc="accumulate over time, samples and fits", structural=True, heading="accumulation")
+    max_history: int = param(255, 10, 255, "[10;255] longest history counted, in frames")
     position_tolerance: float = param(
         4.0, 0.5, 1000, "[0.5;1000] largest distance between points of a history, in widths of a pixel on the surface"
     )
@@ -122,12 +124,14 @@ class Bmfr(Section):
     round_history: bool = param(True, doc="round the history's length before it is used", structural=True)
     alpha: float = param(0.2, 0, 1, "[0;1] smallest share of the new frame before the fit; 0: running mean")
     alpha_fit: float = param(0.1, 0, 1, "[0;1] smallest share of the new fit; 0: running mean")
+    fit: bool = param(
+        True, doc="fit blocks by features; off: what was accumulated before", structural=True, heading="regression"
+    )
     features: str = param(
         "1,n,w,w2",
         words=("1", "n", "w", "w2", "w3", "albedo", "roughness", "depth"),
         doc="what a block is fitted by: constant, normal, position with its square and cube; first the constant",
         structural=True,
-        heading="regression",
     )
     block: int = param(32, 8, 64, "[8;64] side of a block, in pixels", structural=True)
     part: int = param(
@@ -351,6 +355,9 @@ PRESETS: dict[str, dict[str, dict[str, Value]]] = {
             "unit_scale": False,
             "regularization": "noise",
             "noise": 0.01,
+            "temporal": True,
+            "fit": True,
+            "demodulate": True,
         },
         # The authors' OpenCL code, where it differs from the paper.
         "reference": {
@@ -363,6 +370,9 @@ PRESETS: dict[str, dict[str, dict[str, Value]]] = {
             "unit_scale": True,
             "regularization": "noise",
             "noise": 0.01,
+            "temporal": True,
+            "fit": True,
+            "demodulate": True,
         },
         # What measured best in error at equal time on flights through both scenes (docs/bmfr.md).
         "best": {"part": 16, "regularization": "both"},

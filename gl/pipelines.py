@@ -137,8 +137,12 @@ def _bmfr(g: Graph, config: Config, traits: FrameTraits) -> Tex:
     s, p = Signals(g, config), config.bmfr
     threads = thread_count(p.features, traits.software, part_count(p))
     view = View(traits.basis, traits.jitter, traits.pixel_size, traits.index, threads)
-    clean = bmfr(g, s.direct, s.indirect, s.albedo, Guides(g, traits.moving), p, view)
-    return g.add(display.Modulate(), in_direct=clean, in_albedo=s.albedo, in_emission=s.emission).out_radiance
+    signals, albedo_after = {"direct": s.direct, "indirect": s.indirect}, {"in_albedo": s.albedo}
+    if not p.demodulate:
+        both = g.add(display.Combine(), in_direct=s.direct, in_indirect=s.indirect, in_albedo=s.albedo).out_color
+        signals, albedo_after = {"direct": both}, {}
+    clean = bmfr(g, signals, s.albedo, Guides(g, traits.moving), p, view)
+    return g.add(display.Modulate(), in_direct=clean, in_emission=s.emission, **albedo_after).out_radiance
 
 
 def _spatial(denoiser: str) -> Builder:

@@ -16,7 +16,7 @@ class Action(Enum):
     NEXT = auto()
     """A parameter takes its next value, a switch the other one [section.key, or a key of the method's own section]."""
     STAGE = auto()
-    """Wavelet iterations, or another count, become 0 or what they were [section.key, or a key of the method's own]."""
+    """A count becomes 0 or what it was, a switch off or on [keys of the method's own section: of a/b the first]."""
     COUNT = auto()
     """A number of the configuration goes up or down [key and step, such as ``iterations +1``]."""
     JITTER = auto()
@@ -65,7 +65,7 @@ BINDINGS: Final = (
     Binding("P", Action.NEXT, "next preset of the method's parameters", "preset"),
     Binding("F1", Action.NEXT, "accumulation over time on or off", "temporal"),
     Binding("F2", Action.NEXT, "guidance by the variance on or off", "variance_guided"),
-    Binding("F3", Action.STAGE, "the à-trous wavelet on or off", "iterations"),
+    Binding("F3", Action.STAGE, "the à-trous wavelet, or BMFR's regression, on or off", "iterations/fit"),
     Binding("LEFT", Action.COUNT, "one wavelet iteration less", "iterations -1"),
     Binding("RIGHT", Action.COUNT, "one wavelet iteration more", "iterations +1"),
     Binding("F4", Action.NEXT, "filtering without the surfaces' albedo (demodulation) on or off", "demodulate"),

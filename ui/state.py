@@ -89,11 +89,6 @@ class State:
         return SECTIONS_OF[self.denoiser]
 
     @property
-    def section(self) -> str:
-        """The first of them; "" if there are none."""
-        return next(iter(self.sections), "")
-
-    @property
     def anti_aliased(self) -> bool:
         """Whether the picture goes through TAA."""
         return self.config.taa.enabled and self.denoiser not in UNFILTERED
@@ -113,13 +108,15 @@ class State:
     def parameter(self, name: str) -> tuple[str, Param] | None:
         """Full name, ``section.key``, and metadata of a parameter; None if the method shown has none of that name.
 
-        ``name``: ``section.key``, or a key of a section that is the method's own.
+        ``name``: ``section.key``, or a key of a section that is the method's own; of several, ``a/b``, the first that
+        it has.
         """
-        section, _, key = name.rpartition(".")
-        for place in (section,) if section else self.sections:
-            known = parameters(SECTIONS[place])
-            if key in known:
-                return f"{place}.{key}", known[key]
+        section, _, keys = name.rpartition(".")
+        for key in keys.split("/"):
+            for place in (section,) if section else self.sections:
+                known = parameters(SECTIONS[place]) if place in SECTIONS else {}
+                if key in known:
+                    return f"{place}.{key}", known[key]
         return None
 
     def value(self, name: str) -> Any:
@@ -196,12 +193,12 @@ class State:
         name, _, step = binding.value.partition(" ")
         found = self.parameter(name)
         if found is None:
-            self.news = f"{self.denoiser}: has no {name.replace('_', ' ')}"
+            self.news = f"{self.denoiser}: has no {name.partition('/')[0].replace('_', ' ')}"
             return
         full, spec = found
         value = self.value(full)
         if binding.action is Action.STAGE:
-            new = 0 if value else self._counts.pop(full, spec.default)
+            new = type(spec.default)(0) if value else self._counts.pop(full, spec.default)
             if value:
                 self._counts[full] = value
         elif binding.action is Action.COUNT:

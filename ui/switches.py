@@ -40,8 +40,8 @@ def switches(state: State, status: Status) -> list[Switch]:
     together: dict[str, list[Binding]] = {}
     for binding in BINDINGS:
         if binding.action in (*_PARAMETERS, *_OTHERS):
-            together.setdefault(_target(binding), []).append(binding)
-    return [Switch(tuple(same), _name(same[0]), _value(same[0], state, status)) for same in together.values()]
+            together.setdefault(_target(binding).partition("/")[0], []).append(binding)
+    return [Switch(tuple(same), _name(same[0], state), _value(same[0], state, status)) for same in together.values()]
 
 
 def uses(state: State, section: str) -> bool:
@@ -60,8 +60,12 @@ def _target(binding: Binding) -> str:
     return binding.value.partition(" ")[0] if named else binding.action.name.lower()
 
 
-def _name(binding: Binding) -> str:
-    section, _, key = _target(binding).rpartition(".")
+def _name(binding: Binding, state: State) -> str:
+    target = _target(binding)
+    section, _, keys = target.rpartition(".")
+    key, _, others = keys.partition("/")
+    if others and (found := state.parameter(target)):
+        key = found[0].partition(".")[2]
     return (section if key in _NAMELESS else key).replace("_", " ")
 
 

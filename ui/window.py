@@ -221,6 +221,8 @@ class Viewer:
             self._opening.close()
         self._refused = ""
         self._opening = Opening(name, self.state.config, None, True, notify=self.window.wake)
+        self.state.tell(f"opening {Path(name).name}")
+        self._stale = True  # told at once: the key or the drop was heard
 
     def _enter(self, opening: Opening) -> None:
         """Show the scene that has been prepared, or tell why it cannot be."""

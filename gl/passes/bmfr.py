@@ -79,7 +79,7 @@ class Accumulate(FragmentPass):
 
     shader = "bmfr/accumulate.frag"
     in_direct = In("irradiance")
-    in_indirect = In("irradiance")
+    in_indirect = In("irradiance, to be added", optional=True)
     in_motion = In("xy: previous uv - uv; z: expected previous depth, scene units; w: object id, -1 = miss")
     in_surface = In("xyz: shading normal, world; w: depth, scene units")
     in_prev_normal = In(
@@ -96,6 +96,16 @@ class Accumulate(FragmentPass):
     u_max_history = Uniform("float", "[1;255] frames, the longest history that is counted")
     u_position_tolerance = Uniform("float", "> 0, widths of a pixel on the surface")
     u_normal_tolerance = Uniform("float", "[0;4] squared distance of the normals")
+
+
+class Samples(FragmentPass):
+    """This frame's samples alone, in the form in which :class:`Accumulate` hands them on."""
+
+    shader = "bmfr/samples.frag"
+    in_direct = In("irradiance")
+    in_indirect = In("irradiance, to be added", optional=True)
+    in_surface = In("xyz: shading normal, world; w: depth, scene units")
+    out_color = Out("rgba16f", SAMPLES)
 
 
 class Fit(ComputePass):
@@ -186,11 +196,17 @@ def shared_bytes(features: int, threads: int, parts: int = 0) -> int:
     return 4 * triangle * slots + 2 * 16 * threads + 16 * features * (1 + parts)
 
 
-def bmfr(g: Graph, direct: Tex, indirect: Tex, albedo: Tex, guides: Guides, p: Bmfr, view: View) -> Tex:
-    """Filter the sum of ``direct`` and ``indirect`` (noisy irradiance); returns the clean one."""
+def bmfr(g: Graph, signals: dict[str, Tex], albedo: Tex, guides: Guides, p: Bmfr, view: View) -> Tex:
+    """Filter the sum of ``signals`` (noisy irradiance by name: "direct" and, if it is apart, "indirect"); returns the
+    clean one. Histories are named by whether the signals hold the albedo."""
+    inputs = {f"in_{name}": noisy for name, noisy in signals.items()}
+    names = "bmfr" if p.demodulate else "bmfr.radiance"
     with g.scope("bmfr"):
-        noisy, guide = g.history("bmfr.noisy", "rgba16f"), g.history("bmfr.guide", "rg32f")
-        samples = g.add(
+        if not p.temporal:
+            samples = g.add(Samples(), in_surface=guides.surface, **inputs).out_color
+            return _fit(g, samples, albedo, guides, p, view) if p.fit else samples
+        noisy, guide = g.history(f"{names}.noisy", "rgba16f"), g.history(f"{names}.guide", "rg32f")
+        accumulated = g.add(
             Accumulate(
                 u_view=view.rows,
                 u_pixel_size=view.pixel_size,
@@ -200,24 +216,28 @@ def bmfr(g: Graph, direct: Tex, indirect: Tex, albedo: Tex, guides: Guides, p: B
                 u_normal_tolerance=p.normal_tolerance,
                 defines={"ROUND_HISTORY": int(p.round_history)},
             ),
-            in_direct=direct,
-            in_indirect=indirect,
             in_motion=guides.motion,
             in_surface=guides.surface,
             prev_color=noisy,
             prev_guide=guide,
+            **inputs,
             **guides.optional,
         )
-        g.feed(noisy, samples.out_color)
-        g.feed(guide, samples.out_guide)
-        features = {"in_albedo": albedo} if "albedo" in p.features.split(",") else {}
-        fit = g.add(Fit(p, view), in_color=samples.out_color, in_surface=guides.surface, **features).out_color
-        fitted = g.history("bmfr.fitted", "rgba16f")
+        g.feed(noisy, accumulated.out_color)
+        g.feed(guide, accumulated.out_guide)
+        if not p.fit:
+            return accumulated.out_color
+        fitted = g.history(f"{names}.fitted", "rgba16f")
         clean = g.add(
             AccumulateFit(u_alpha=p.alpha_fit),
-            in_color=fit,
-            in_reprojection=samples.out_reprojection,
+            in_color=_fit(g, accumulated.out_color, albedo, guides, p, view),
+            in_reprojection=accumulated.out_reprojection,
             prev_color=fitted,
         ).out_color
         g.feed(fitted, clean)
         return clean
+
+
+def _fit(g: Graph, samples: Tex, albedo: Tex, guides: Guides, p: Bmfr, view: View) -> Tex:
+    features = {"in_albedo": albedo} if "albedo" in p.features.split(",") else {}
+    return g.add(Fit(p, view), in_color=samples, in_surface=guides.surface, **features).out_color

@@ -116,7 +116,7 @@ def poisoned(spoilt: str, packet: FramePacket, index: int) -> Graph:
     g = PoisonedGraph(spoilt)
     view = bmfr.View(STANDARD_BASIS, (0.0, 0.0), packet.pixel_size, index, 8)
     direct, indirect, albedo = (g.import_(f"frame.{name}", "rgba32f") for name in ("direct", "indirect", "albedo"))
-    g.output("color", bmfr.bmfr(g, direct, indirect, albedo, Guides(g, False), Bmfr(), view))
+    g.output("color", bmfr.bmfr(g, {"direct": direct, "indirect": indirect}, albedo, Guides(g, False), Bmfr(), view))
     return g
 
 

@@ -119,6 +119,14 @@ def test_the_wavelet_and_its_iterations():
     assert press(s, "F3").config.svgf.iterations > 0
 
 
+@pytest.mark.parametrize(("key", "name"), [("F1", "temporal"), ("F3", "fit"), ("F4", "demodulate")])
+def test_stages_of_bmfr(key, name):
+    s = press(state("bmfr"), key)
+    assert s.config == config.load(None, [f"bmfr.{name}=false"])
+    assert s.news == f"bmfr.{name} = false"
+    assert press(s, key).config == state().config
+
+
 def test_choices_go_round():
     s = state()
     seen = [press(s, "F9").config.display.tonemap for _ in range(4)]

@@ -28,7 +28,7 @@ T = TypeVar("T")
 
 ROOT = Path(__file__).resolve().parents[2]
 START_SECONDS = 180.0  # the first start ever compiles the tracer's kernels
-SECONDS = 30.0  # for anything else; reached only if something is wrong
+SECONDS = 90.0  # for anything else; reached only if something is wrong, however busy the machine
 
 STILL = 0.004
 """Mean difference of two filtered pictures of the same view: what noise is left. Measured: 0.0006 to 0.0024."""
@@ -186,6 +186,12 @@ class App:
         since = len(self.stdout())
         self.press(key)
         return self.hear(pattern, since)
+
+    def go_to_scene(self, name: str) -> None:
+        """Press N until scene ``name`` is being opened, those on the way are given up, and wait until it is shown."""
+        while (heard := self.ask("n", r"^frame \d+: (?:.* · )?opening (\w+)$"))[1] != name:
+            pass
+        self.hear(f"opened {name}", heard.end(), START_SECONDS)
 
     def click(self, button: int, pattern: str) -> re.Match[str]:
         """The same for a button of the mouse; 4 and 5 are the wheel, away from the hand and back."""

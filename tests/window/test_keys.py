@@ -10,7 +10,8 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 
-from tests.window.desktop import F32, STILL, App, application, difference, plan, roughness, wait_for
+import assets
+from tests.window.desktop import F32, START_SECONDS, STILL, App, application, difference, plan, roughness, wait_for
 from ui.keys import BINDINGS, Binding
 
 pytestmark = pytest.mark.window
@@ -161,10 +162,13 @@ def single_step(app: App) -> None:
 
 
 def next_scene(app: App) -> None:
-    frames = app.ask("n", r"^frame (\d+): ")
-    app.hear("opened interior", frames.end(), 120.0)
-    app.ask("n", "opened cornell")
-    app.await_title(r"· cornell · svgf")
+    """The second scene, and round all others back to the first."""
+    first, second, *_ = assets.SCENES
+    heard = app.ask("n", f"opening {second}")
+    app.hear(f"opened {second}", heard.end(), START_SECONDS)
+    app.await_title(f"· {second} · svgf")
+    app.go_to_scene(first)
+    app.await_title(f"· {first} · svgf")
 
 
 def camera_home(app: App) -> None:
@@ -336,6 +340,16 @@ CHECKS: dict[str, Callable[[App], None]] = {
 def test_every_key_does_what_the_table_says(app: App, binding: Binding) -> None:
     assert binding.key in CHECKS, "a key that nobody has tried"
     CHECKS[binding.key](app)
+
+
+def test_the_stages_of_bmfr_are_on_keys_too(app: App) -> None:
+    app.press("2")
+    app.await_passes(plan("bmfr"))
+    for key, setting in {"F1": "bmfr.temporal", "F3": "bmfr.fit", "F4": "bmfr.demodulate"}.items():
+        for value in ("false", "true"):
+            app.ask(key, f": {setting} = {value}$")
+            app.await_passes(plan("bmfr", f"{setting}={value}"))
+    app.press("1")
 
 
 def test_every_check_is_of_a_key_there_is() -> None:

@@ -6,7 +6,9 @@
 #include "common/octahedral.glsl"
 
 uniform sampler2D in_direct;
+#if HAS_IN_INDIRECT
 uniform sampler2D in_indirect;
+#endif
 uniform sampler2D in_motion;  // uv offset, expected previous depth, object id
 uniform sampler2D in_surface; // normal, depth
 #if HAS_IN_PREV_NORMAL
@@ -38,7 +40,10 @@ vec3 view_position(vec2 texel, float depth) {
 void main() {
     ivec2 p = ivec2(gl_FragCoord.xy);
     size = textureSize(in_motion, 0);
-    vec3 c = texelFetch(in_direct, p, 0).rgb + texelFetch(in_indirect, p, 0).rgb;
+    vec3 c = texelFetch(in_direct, p, 0).rgb;
+#if HAS_IN_INDIRECT
+    c += texelFetch(in_indirect, p, 0).rgb;
+#endif
     bool usable = is_finite(c);
     c = usable ? clamp_radiance(c) : vec3(0.0);
     vec4 motion = texelFetch(in_motion, p, 0);
