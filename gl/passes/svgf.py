@@ -35,21 +35,8 @@ from __future__ import annotations
 
 from config import Svgf
 from gl.graph import FragmentPass, Graph, In, Out, Tex, Uniform
-from gl.passes.temporal import REPROJECTION, Guides, accumulate, reproject
-
-
-class Variance(FragmentPass):
-    """Replace the temporal variance by a spatial estimate where the history is shorter than four frames (sec. 4.2)."""
-
-    shader = "svgf/variance.frag"
-    in_color = In("rgb: irradiance; a: standard deviation over time")
-    in_moments = In("first and second moment of luminance", optional=True)
-    in_surface = In("xyz: shading normal, world; w: depth, scene units")
-    in_gradient = In("depth change per pixel, scene units")
-    in_reprojection = In(REPROJECTION, optional=True)
-    out_color = Out("rgba16f", "rgb: irradiance, unchanged unless PREFILTER; a: standard deviation")
-    u_sigma_z = Uniform("float", "> 0, depth edge-stopping")
-    u_pixel_size = Uniform("float", "> 0, scene units a pixel is wide at depth 1")
+from gl.passes.temporal import REPROJECTION, Guides, reproject
+from gl.passes.variance import estimate
 
 
 class Atrous(FragmentPass):
@@ -104,23 +91,11 @@ def svgf(g: Graph, signals: dict[str, Tex], guides: Guides, p: Svgf, pixel_size:
 def _filter_signal(
     g: Graph, name: str, noisy: Tex, reprojection: Tex | None, guides: Guides, p: Svgf, pixel_size: float
 ) -> Tex:
-    x = noisy
-    estimate: dict[str, Tex] = {}
-    history = None
-    if reprojection is not None:
-        history = g.history(name, "rgba16f")
-        x, moments = accumulate(g, x, reprojection, history, p, clamp=p.clamp)
-        estimate = {"in_moments": moments, "in_reprojection": reprojection}
-    # Without time there is no other variance than the one in space; without guidance by variance there is none at all.
-    shape = {"in_surface": guides.surface, "in_gradient": guides.gradient}
-    if p.variance_guided:
-        prefilter = {"PREFILTER": 1} if p.prefilter else None
-        stage = Variance(u_sigma_z=p.sigma_z, u_pixel_size=pixel_size, defines=prefilter)
-        unfiltered, x = x, g.add(stage, in_color=x, **shape, **estimate).out_color
-    else:
-        unfiltered = x
+    history = g.history(name, "rgba16f") if reprojection is not None else None
+    unfiltered, x = estimate(g, noisy, reprojection, history, guides, p, pixel_size)
     if history is not None and p.feedback < 0:
         g.feed(history, unfiltered)
+    shape = {"in_surface": guides.surface, "in_gradient": guides.gradient}
     length: dict[str, Tex] = {}
     if reprojection is not None and p.variance_guided and p.accumulated_variance:
         length = {"in_reprojection": reprojection}
