@@ -288,10 +288,18 @@ def bench_parser() -> Parser:
         "Measure every denoiser on the same traced frames: time, and error and flicker against references of 1024\n"
         "paths per pixel; and the tracer's time. Prints tables and writes JSON. References are kept in .cache/: only\n"
         "the first run takes long.",
-        "examples:\n  app.py bench --quick\n  app.py bench --scene cornell --out out/cornell.json",
+        "examples:\n"
+        "  app.py bench --quick\n"
+        "  app.py bench --scene cornell --out out/cornell.json\n"
+        "  app.py bench --hard --out out/hard.json                     inputs on which formulas as printed fail",
     )
     parser.add_argument("--scene", action="append", metavar="S", help="repeatable (default: cornell and interior)")
     parser.add_argument("--quick", action="store_true", help="small pictures, few samples: does it run, not how fast")
+    parser.add_argument(
+        "--hard",
+        action="store_true",
+        help="measure the hard cases instead (see docs/hard_cases.md): exact answer, error, what no care would give",
+    )
     parser.add_argument("--table", action="store_true", help="print tables: the default, for those who say so")
     _add_size(parser)
     parser.add_argument(

@@ -43,16 +43,18 @@ float origin_at(ivec2 q) { return 0.0; }
 vec2 moments_at(ivec2 q) { return texelFetch(in_moments, q, 0).xy; }
 #endif
 #else
-vec4 usable(vec3 c) { return is_finite(c) ? vec4(clamp_radiance(c), 0.0) : vec4(0.0); }
+// Alpha below 0: there is no sample.
+vec4 usable(vec3 c) { return is_finite(c) ? vec4(clamp_radiance(c), 0.0) : vec4(vec3(0.0), -1.0); }
 #ifdef SAMPLE
 vec4 color_at(ivec2 q) { return vec4(texelFetch(in_color, q, 0).rgb, 0.0); }
-float origin_at(ivec2 q) { return luminance(usable(texelFetch(in_sample, q, 0).rgb).rgb); }
+vec4 sample_at(ivec2 q) { return usable(texelFetch(in_sample, q, 0).rgb); }
 float history_at(ivec2 q) { return MIN_HISTORY; }
 #else
 vec4 color_at(ivec2 q) { return usable(texelFetch(in_color, q, 0).rgb); }
-float origin_at(ivec2 q) { return luminance(color_at(q).rgb); }
+vec4 sample_at(ivec2 q) { return color_at(q); }
 float history_at(ivec2 q) { return 1.0; }
 #endif
+float origin_at(ivec2 q) { return luminance(sample_at(q).rgb); }
 vec2 moments_at(ivec2 q) {
     float l = origin_at(q) - origin;
     return vec2(l, l * l);
@@ -75,9 +77,7 @@ void main() {
 #endif
     int last = wanted && surface.w > 0.0 ? 48 : -1;
     vec3 sum = vec3(0.0);
-#ifdef PREFILTER
     vec3 colors = vec3(0.0);
-#endif
     ivec2 size = textureSize(in_color, 0);
     vec2 gradient = texelFetch(in_gradient, p, 0).xy;
     float floor_z = 0.1 * u_pixel_size * surface.w;
@@ -90,10 +90,11 @@ void main() {
         n *= n; n *= n; n *= n; n *= n; n *= n; n *= n; n *= n; // ^128
         float range = u_sigma_z * abs(dot(gradient, vec2(d))) + floor_z * length(vec2(d)) + 1e-30;
         float w = sane_weight(n * exp(-abs(surface.w - s.w) / range));
-        sum += w * vec3(moments_at(q), 1.0);
-#ifdef PREFILTER
-        colors += w * color_at(q).rgb;
+#if !HAS_IN_MOMENTS
+        w = sample_at(q).a < 0.0 ? 0.0 : w;
 #endif
+        sum += w * vec3(moments_at(q), 1.0);
+        colors += w * color_at(q).rgb;
     }
     if (last >= 0 && sum.z > 0.0) {
         vec2 m = sum.xy / sum.z;
@@ -104,7 +105,10 @@ void main() {
         if (texelFetch(in_reprojection, p, 0).w + 1.0 < MIN_HISTORY) color.rgb = colors / sum.z;
 #elif defined(PREFILTER)
         color.rgb = colors / sum.z;
+#elif !HAS_IN_MOMENTS && !defined(SAMPLE)
+        if (color_at(p).a < 0.0) color.rgb = colors / sum.z; // without time there is nothing else to take
 #endif
     }
+    color.a = max(color.a, 0.0);
     out_color = round_to_half(color);
 }
