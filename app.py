@@ -65,6 +65,11 @@ def run(argv: Sequence[str]) -> int:
 
         headless.render(headless.RenderJob.of(args, config), config)
     elif args.command == "bench":
+        if args.hard:
+            from bench.hard import cases
+
+            cases.run(args.out)
+            return 0
         from bench import command
 
         command.run(config, tuple(args.scene or ("cornell", "interior")), args.quick, args.out, args.html)

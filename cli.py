@@ -337,11 +337,17 @@ def bench_parser() -> Parser:
         "paths per pixel; path tracing in the same time; and the tracer's time. Prints tables, writes JSON and CSV.\n"
         "References are kept in .cache/: only the first run takes long.",
         "examples:\n  app.py bench --quick\n  app.py bench --html --size 320x180\n"
-        "  app.py bench --scene cornell --out out/cornell.json",
+        "  app.py bench --scene cornell --out out/cornell.json\n"
+        "  app.py bench --hard --out out/hard.json                     inputs on which formulas as printed fail",
     )
     parser.add_argument("--scene", action="append", metavar="S", help="repeatable (default: cornell and interior)")
     _add_environment(parser)
     parser.add_argument("--quick", action="store_true", help="small pictures, few samples: does it run, not how fast")
+    parser.add_argument(
+        "--hard",
+        action="store_true",
+        help="measure the hard cases instead (see docs/hard_cases.md): exact answer, error, what no care would give",
+    )
     parser.add_argument("--table", action="store_true", help="print tables: the default, for those who say so")
     parser.add_argument(
         "--html", action="store_true", help="also write a page with diagrams and pictures, OUT with suffix .html"

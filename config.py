@@ -90,6 +90,12 @@ class Svgf(Section):
     variance_guided: bool = param(
         True, doc="steer the luminance weight by the variance", structural=True, heading="variance"
     )
+    variance: str = param(
+        "raw",
+        choices=("raw", "raw-mean", "welford", "welford-mean", "spatial", "spatial-temporal", "exaggerated"),
+        doc="how it is estimated: over time from raw or centred moments, in space, in both, or a hundredfold",
+        structural=True,
+    )
     accumulated_variance: bool = param(
         True, doc="scale the variance to that of the accumulated colour after the first iteration", structural=True
     )

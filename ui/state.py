@@ -95,11 +95,6 @@ class State:
         return SECTIONS_OF[self.denoiser]
 
     @property
-    def section(self) -> str:
-        """The first of them; "" if there are none."""
-        return next(iter(self.sections), "")
-
-    @property
     def judged(self) -> bool:
         """Whether somebody looks at the error of the picture: only then a reference is traced."""
         return (self.hud or self.error_map) and self.denoiser != "reference"

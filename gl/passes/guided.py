@@ -19,8 +19,8 @@ from __future__ import annotations
 
 from config import Guided
 from gl.graph import FragmentPass, Graph, In, Out, Tex, Uniform
+from gl.passes.temporal import SAMPLE as COLOR
 
-COLOR = "rgb: irradiance, finite; a: 1, or 0 where there is none"
 SURFACE = "xyz: shading normal, world; w: depth, scene units"
 ROW_COLOR = "rgb: mean colour of the row; a: number of its samples"
 ROW_GUIDE = "mean guide of the row, relative to its middle pixel's"

@@ -29,12 +29,12 @@ import math
 from collections.abc import Callable
 from typing import Any, Final
 
-from config import Config, Spatial
-from gl.graph import FragmentPass, Graph, History, In, Out, Prev, Tex, Uniform
+from config import Config
+from gl.graph import FragmentPass, Graph, In, Out, Tex, Uniform
 from gl.passes.guided import guided
-from gl.passes.temporal import REPROJECTION, Guides, reproject
+from gl.passes.temporal import SAMPLE as COLOR
+from gl.passes.temporal import Guides, blend, reproject
 
-COLOR = "rgb: irradiance, finite; a: 1, or 0 where there is none"
 ROW = "rgb: mean along the row; a: weight that was there, of all that there might be"
 SURFACE = "xyz: shading normal, world; w: depth, scene units"
 GRADIENT = "depth change per pixel, scene units"
@@ -52,17 +52,6 @@ class Sample(FragmentPass):
     in_surface = In(SURFACE)
     in_albedo = In("divisor of the irradiance, where the filter is to see it", optional=True)
     out_color = Out("rgba16f", COLOR)
-
-
-class Blend(FragmentPass):
-    """Blend a colour with its history (Schied et al. 2017, sec. 4.1), without any moments."""
-
-    shader = "temporal/blend.frag"
-    in_color = In(COLOR)
-    in_reprojection = In(REPROJECTION)
-    prev_color = Prev(COLOR)
-    out_color = Out("rgba16f", COLOR)
-    u_alpha = Uniform("float", "[0;1] smallest weight of the new colour")
 
 
 class Gaussian(FragmentPass):
@@ -206,13 +195,9 @@ def spatial(
         if not p.temporal:
             return work.add(g, denoiser, color)
         found = reproject(g, guides, name, p, pixel_size)
-        if p.order == "blend-first":
-            return work.add(g, denoiser, _blend(g, color, found, g.history(name, "rgba16f"), p))
-        return _blend(g, work.add(g, denoiser, color), found, g.history(name, "rgba16f"), p)
-
-
-def _blend(g: Graph, color: Tex, found: Tex, history: History, p: Spatial) -> Tex:
-    work = Blend(u_alpha=p.alpha)
-    blended = g.add(work, in_color=color, in_reprojection=found, prev_color=history).out_color
-    g.feed(history, blended)
-    return blended
+        history, last = g.history(name, "rgba16f"), p.order == "filter-first"
+        if last:
+            color = work.add(g, denoiser, color)
+        blended = blend(g, color, found, history, p.alpha)
+        g.feed(history, blended)
+        return blended if last else work.add(g, denoiser, blended)
