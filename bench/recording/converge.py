@@ -100,16 +100,27 @@ def _publish(sequence: Sequence, index: int, reference: Reference, notes: dict[s
 
 def _finish(recording: Recording, sequence: Sequence, notes: dict[str, Any]) -> None:
     """Note the flicker that the references have by their own noise, and print how noisy they are."""
-    last: tuple[Reference, FramePacket] | None = None
-    for index in range(sequence.frames):
-        now = _load(sequence, index), sequence.packet(index, cut=True)
-        note = notes.get(str(index), {})
-        if last is not None and "temporal_noise" not in note and min(*now[0].counts, *last[0].counts) > 0:
-            mask = surfaces(now[1]) & surfaces(last[1])
-            note["temporal_noise"] = temporal_noise(now, last, mask) if mask.any() else None
-        last = now
+    last: tuple[int, Reference, FramePacket] | None = None
+    for index in range(1, sequence.frames):
+        note = notes.get(str(index))
+        if note is None or "temporal_noise" in note:
+            continue
+        before, now = (_with_packet(sequence, number, last) for number in (index - 1, index))
+        last = index, *now
+        if min(*now[0].counts, *before[0].counts) > 0:
+            mask = surfaces(now[1]) & surfaces(before[1])
+            note["temporal_noise"] = temporal_noise(now, before, mask) if mask.any() else None
     recording.save_notes()
     noise = [note["noise"] for note in notes.values() if note["noise"] is not None]
     if noise:
         least = min(note["samples"] for note in notes.values())
         print(f"references: {least} paths per pixel or more, RMSE of their own noise {pooled(noise):.3g} (linear)")
+
+
+def _with_packet(
+    sequence: Sequence, index: int, last: tuple[int, Reference, FramePacket] | None
+) -> tuple[Reference, FramePacket]:
+    """The reference of a frame and the frame, which may be the one read last."""
+    if last is not None and last[0] == index:
+        return last[1:]
+    return _load(sequence, index), sequence.packet(index, cut=True)
