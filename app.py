@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import cli
 import config as configuration
-from config import Config
+from config import Config, Surroundings
 from errors import UserError
 
 if TYPE_CHECKING:
@@ -26,7 +26,10 @@ def load_config(args: argparse.Namespace) -> Config:
         changes["width"], changes["height"] = args.size
     if getattr(args, "seed", None) is not None:
         changes["seed"] = args.seed
-    return replace(config, render=replace(config.render, **changes))
+    surroundings = config.surroundings
+    if getattr(args, "environment", None) is not None:
+        surroundings = Surroundings(args.environment, args.environment_strength, args.environment_rotation)
+    return replace(config, render=replace(config.render, **changes), surroundings=surroundings)
 
 
 def has_display() -> bool:
@@ -62,9 +65,14 @@ def run(argv: Sequence[str]) -> int:
 
         headless.render(headless.RenderJob.of(args, config), config)
     elif args.command == "bench":
+        if args.hard:
+            from bench.hard import cases
+
+            cases.run(args.out)
+            return 0
         from bench import command
 
-        command.run(config, tuple(args.scene or ("cornell", "interior")), args.quick, args.out)
+        command.run(config, tuple(args.scene or ("cornell", "interior")), args.quick, args.out, args.html)
     elif args.command == "record":
         from bench.recording import record
 

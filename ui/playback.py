@@ -74,8 +74,10 @@ class Reader:
         now: float,
         previous: float,
         cut: bool,
+        remember: str,
+        lamps: float,
     ) -> FramePacket:
-        """The recorded frame at the time ``now``; ``index`` and the cameras say nothing here."""
+        """The recorded frame at the time ``now``; all that would change how it is traced says nothing here."""
         start = time.perf_counter()
         number = round(now * FPS)
         packet = self._packet(number, cut or number in self._frames.cuts)
@@ -107,6 +109,8 @@ class Playback:
 
     triangles = 0
     work = "reading"
+    resting = False
+    snapshot = None
 
     def __init__(self, frames: Frames, first: int, end: int, wake: Callable[[], None]) -> None:
         self._frames, self._first, self._end = frames, first, end
@@ -168,6 +172,10 @@ class Playback:
         else:
             return None
         return self._packet
+
+    def take_path(self) -> list[Camera]:
+        """None: it is not the user's."""
+        return []
 
     def close(self) -> None:
         self._worker.close()

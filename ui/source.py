@@ -8,6 +8,7 @@ from typing import Protocol
 from raytrace.camera import Camera
 from raytrace.compiled import CompiledScene
 from raytrace.frame import FramePacket
+from raytrace.still import Snapshot
 from ui.camera_control import HeldKeys
 from ui.keys import Action
 from ui.state import State
@@ -52,6 +53,17 @@ class Source(Protocol):
 
     def take(self) -> FramePacket | None:
         """The frame under way, or None if it is not ready."""
+
+    def take_path(self) -> list[Camera]:
+        """The cameras noted since the last call, one for each frame that was begun while the state asked for it."""
+
+    @property
+    def resting(self) -> bool:
+        """Nothing moves, and there is a scene: a reference of the view can be traced."""
+
+    @property
+    def snapshot(self) -> Snapshot | None:
+        """The reference of the view at rest, as far as it has got; None while something moves, or nobody wants it."""
 
     def close(self) -> None:
         """Wait for the frame under way, which is lost, and free everything."""

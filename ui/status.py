@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from bench.judge import Verdict
 from gl.executor import Result
 from gl.profiler import Row
 from gl.resources import VALID
@@ -26,6 +27,9 @@ class Status:
     ``packet`` and ``result``: the frame shown. ``cursor``: the pixel of the picture that the mouse is over, (x, y) with
     row 0 at the bottom; None outside.
 
+    ``resting``: nothing moves, so that a reference can be traced. ``errors_now``: of the picture against it, as they
+    were last found; None while there are none.
+
     ``lapse``: why histories were void when they last were, ``frames`` so many frames ago: see :meth:`show`.
     """
 
@@ -45,6 +49,8 @@ class Status:
     cursor: tuple[int, int] | None = None
     lapse: str = ""
     frames: int = 0
+    resting: bool = False
+    errors_now: Verdict | None = None
 
     def show(self, packet: FramePacket, result: Result) -> None:
         """Another frame is shown. A history is void for one frame only: too short to be read, so that is kept."""

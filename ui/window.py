@@ -27,13 +27,14 @@ from ui.filters import Filters
 from ui.glfw_window import Cursor, DroppedFiles, Event, Exposed, Focus, Key, MouseButton, Wheel, Window
 from ui.keeping import Keeper
 from ui.keys import Action
+from ui.live_error import LiveError
 from ui.log import Log
 from ui.opening import Opening
 from ui.overlay import Overlay
 from ui.playback import Frames, Playback
 from ui.present import Presenter, letterbox
 from ui.resolution import Calibration, step
-from ui.screenshot import save_screenshot
+from ui.screenshot import save_path, save_screenshot
 from ui.source import NewRecorder, Source
 from ui.stage import Stage
 from ui.state import PICTURE, State
@@ -127,6 +128,8 @@ class Viewer:
             stack.callback(self._textures.release)
             self._overlay = Overlay(window.ctx)
             stack.callback(self._overlay.release)
+            self._live = LiveError(window.ctx, window.wake)
+            stack.callback(self._live.release)
             self._stack = stack.pop_all()
         self._calibration: Calibration | None = None
         self._opening: Opening | None = None
@@ -168,6 +171,7 @@ class Viewer:
             print(f"OpenGL reports {error}: a mistake of this program, or of the driver", file=sys.stderr)
         if self._opening is not None:
             self._opening.close()
+        self._save_path()
         self._keeper.stop()
         self._stack.close()
 
@@ -237,6 +241,8 @@ class Viewer:
             self._calibration = None
             rungs, state.resolution = state.resolution, 0
             self._resize(step(self._base, self._size, rungs))
+        if not state.path:
+            self._save_path()
         self._keeper.follow(self.stage)
         if state.recording:
             self._calibration = None  # all pictures of a recording have one size
@@ -271,12 +277,18 @@ class Viewer:
             self.state.news = str(error).partition("\n")[0]
             self._refused = str(error)
             return
+        self._save_path()
         self._keeper.stop()
         self.stage.close()
         self.stage = Stage(shot, self._wishes.camera != "still", self.window.wake)
         self.status.scene, self.status.packet, self.status.result = self.stage.name, None, None
         self.state.news = "\n".join(opening.notices).partition("\n")[0] or f"opened {self.stage.name}"
         self._calibrate()
+
+    def _save_path(self) -> None:
+        """Write the cameras that were noted, if any were."""
+        if path := self.stage.take_path():
+            self.state.tell(save_path(self._wishes.out, path, self.stage.name))
 
     def _calibrate(self) -> None:
         """Look for the resolution to show this scene in."""
@@ -319,6 +331,9 @@ class Viewer:
             status.bad = None
         elif packet.index % _COUNT_EVERY == 0:
             status.bad = count_bad(self._result)
+        status.resting = self.stage.resting
+        status.errors_now = self._live.update(now, self._result, self.stage.snapshot, self.state.error_map)
+        self._log.error(status.errors_now)
         status.errors = [*self._filters.errors, *filter(None, [self._refused])]
         self._log.frame(packet.index, packet.size, self._result.plan, status.errors)
         return True
@@ -327,12 +342,15 @@ class Viewer:
         """Draw the last picture, at whatever size the window now has. ``fresh``: it has not been drawn before."""
         state, screen, size = self.state, self.window.ctx.screen, self.window.framebuffer_size
         picture = result.outputs["display"]
+        if state.error_map and self._live.map is not None:
+            picture = self._live.map
         scale = size[0] / max(self.window.size[0], 1)
         column, row = int(self._cursor.x * scale), size[1] - 1 - int(self._cursor.y * scale)
         self.status.cursor = _pixel(column, row, picture.size, size)
-        looked_at = state.view != PICTURE or state.look.zoom > 0
+        looked_at = picture is not self._live.map and (state.view != PICTURE or state.look.zoom > 0)
         if not (looked_at and self._textures.draw(state, self.status, screen, size)):
-            self._presenter.draw(picture, screen, size, result.outputs.get("noisy"), column)
+            noisy = None if picture is self._live.map else result.outputs.get("noisy")
+            self._presenter.draw(picture, screen, size, noisy, column)
         self.status.progress = self._progress
         if self._overlaid:
             self._overlay.draw(self.window.size, size, self.window.content_scale, state, self.status)

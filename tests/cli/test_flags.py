@@ -160,4 +160,4 @@ def test_there_is_an_example_of_each_command() -> None:
 
 def test_a_parser_refuses_before_it_runs_anything() -> None:
     with pytest.raises(UserError, match="no such denoiser"):
-        cli.parse(["render", "--denoiser", "bilateral", "--scene", "interior"])
+        cli.parse(["render", "--denoiser", "median", "--scene", "interior"])
