@@ -16,7 +16,7 @@ from console import Progress
 from errors import UserError, did_you_mean
 from gl.context import create_headless
 from gl.executor import Result
-from gl.pipelines import FrameTraits, build
+from gl.pipelines import FrameTraits, build, remembered
 from gl.renderer import Renderer, read
 from images import to_srgb8, viewable, write_exr, write_png
 from raytrace.frame import FramePacket
@@ -71,6 +71,7 @@ def render(job: RenderJob, config: Config) -> None:
     with ExitStack() as stack:
         renderer = open_renderer((config.render.width, config.render.height), stack)
         shot = open_shot(job.scene, config, job.camera, job.animate, job.jitter)
+        shot.remember = remembered(config, job.denoiser)
         stack.enter_context(shot.tracer)
         _require_texture(job, config, shot)
         with telling_of_memory(renderer, shot.size):
@@ -139,14 +140,13 @@ def reference_of(shot: Shot, packet: FramePacket, samples: int, progress: Callab
     width, height = shot.size
     camera = shot.camera(packet.index).with_jitter(packet.jitter)
     portion = max(1, PATHS_AT_ONCE // (width * height))
-    direct, indirect = np.zeros((2, height, width, 3))
+    signals = np.zeros((2 if packet.specular is None else 3, height, width, 3))
     for first in range(0, samples, portion):
         count = min(portion, samples - first)
         means = shot.tracer.reference(camera, shot.size, count, packet.time, first)
-        direct += means[0] * (count / samples)
-        indirect += means[1] * (count / samples)
+        signals += np.stack(means) * (count / samples)
         progress((first + count) / samples)
-    return modulate(packet, direct, indirect)
+    return modulate(packet, *signals)
 
 
 def _require_texture(job: RenderJob, config: Config, shot: Shot) -> None:

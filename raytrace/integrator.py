@@ -20,14 +20,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from raytrace import kernels
+from raytrace import kernels, kernels_glossy
 from raytrace.camera import Camera
 from raytrace.compiled import OBJECT, CompiledScene
 from raytrace.embree import open_caster
-from raytrace.features import images_of
-from raytrace.frame import FramePacket
+from raytrace.features import ILLUMINATION, images_of
+from raytrace.frame import STRATUM, FramePacket
+from raytrace.gradients import Memory, Moment, Reshading
 from raytrace.guides import Outputs, camera_rays, guide_kernel
-from raytrace.kernels import SHADOW_END
+from raytrace.lights import SHADOW_END
 from raytrace.sampling import HALTON, HASH
 from raytrace.tables import Variant, tables_of, variant_of
 
@@ -77,6 +78,11 @@ class View:
     matrix: F32
     jitter: F32
 
+    @property
+    def pixel(self) -> float:
+        """Width of a pixel at depth 1: ``up`` spans half the image."""
+        return float(np.linalg.norm(self.up)) * 2.0 / self.size[1]
+
     @staticmethod
     def of(camera: Camera, size: tuple[int, int], origin: F64) -> View:
         aspect = size[0] / size[1]
@@ -97,7 +103,7 @@ class _Scratch(threading.local):
     """Buffers of one thread for tiles of up to ``capacity`` paths, made on first use."""
 
     def __init__(self) -> None:
-        self.capacity = 0
+        self.capacity = self.glossy_capacity = 0
 
     def reserve(self, count: int) -> None:
         if count <= self.capacity:
@@ -108,12 +114,23 @@ class _Scratch(threading.local):
         self.light = np.empty((count, 3), np.float32)
         self.index, self.bounce_index = np.empty((2, count), np.int32)
         self.bounce_pdf, self.limit = np.empty((2, count), np.float32)
+        self.glossy_capacity = 0
+
+    def reserve_glossy(self, count: int) -> None:
+        """What paths over glossy surfaces need besides."""
+        if count <= self.glossy_capacity:
+            return
+        self.glossy_capacity = count
+        self.gloss = np.empty((count, 3), np.float32)
+        self.bounce_cosine, self.bounce_weight = np.empty(count, np.float32), np.empty((count, 4), np.float32)
 
 
 @dataclass
 class Settings:
     """How frames are traced. ``generator``: HALTON or HASH; ``threads`` 0 = one per core; ``tile`` pixels per tile;
-    ``positions``: frames carry world positions; ``backend``: see :func:`raytrace.embree.open_caster`."""
+    ``positions``: frames carry world positions; ``backend``: see :func:`raytrace.embree.open_caster`; ``regularize``:
+    narrow lobes are widened at a path's second hit, never in references; ``separable``: Smith's masking in its older,
+    separable form, as some renderers have it."""
 
     seed: int = 0
     generator: int = HALTON
@@ -121,6 +138,8 @@ class Settings:
     tile: int = 16384
     positions: bool = False
     backend: str = "auto"
+    regularize: bool = True
+    separable: bool = False
 
 
 class Tracer:
@@ -138,12 +157,18 @@ class Tracer:
         self.rays = open_caster(scene.triangles, scene.static_count, self.settings.backend)
         self.tables = tables_of(scene)
         self._guides = guide_kernel(self.variant, self.settings.positions)
-        self._first_hit = kernels.first_hit_kernel(self.variant)
-        self._second_hit = kernels.second_hit_kernel(self.variant)
+        if self.variant.specular:
+            self._first_hit = kernels_glossy.first_hit_kernel(self.variant, self.settings.separable)
+            self._second_hit = kernels_glossy.second_hit_kernel(self.variant, self.settings.separable)
+        else:
+            self._first_hit = kernels.first_hit_kernel(self.variant)
+            self._second_hit = kernels.second_hit_kernel(self.variant)
         self._scratch = _Scratch()
+        self._memory = Memory()
         self.threads = self.settings.threads or len(os.sched_getaffinity(0))
         self._pool = ThreadPoolExecutor(self.threads, "trace") if self.threads > 1 else None
-        self._time: tuple[float, float] | None = (0.0, 0.0) if not scene.has_motion else None
+        self._time: tuple[float, float] | None = (0.0, 0.0) if not scene.moves else None
+        self._lamps: tuple[float, float] | None = None
 
     @property
     def kernels(self) -> tuple[Callable[..., object], ...]:
@@ -161,6 +186,13 @@ class Tracer:
             self._pool.shutdown()
         self.rays.close()
 
+    def carry_positions(self, wanted: bool) -> None:
+        """Whether frames from now on have world positions, whatever the settings said; not while one is traced."""
+        if wanted != self.settings.positions:
+            self.settings = replace(self.settings, positions=wanted)
+            self.images = images_of(self.variant, wanted)
+            self._guides = guide_kernel(self.variant, wanted)
+
     def warm_up(self) -> None:
         """Compile, or load from the disk cache, every kernel that frames of this scene need."""
         camera = self.scene.scene.camera
@@ -168,11 +200,18 @@ class Tracer:
         if self.scene.has_motion:
             self.set_time(0.0, 0.0)
 
-    def set_time(self, now: float, previous: float) -> None:
-        """Move what moves to time ``now``; the previous positions are those at ``previous`` (seconds)."""
-        if self.scene.has_motion and self._time != (now, previous):
+    def set_time(self, now: float, previous: float, lamps: float = 1.0) -> None:
+        """Move what moves to time ``now``; the previous positions are those at ``previous`` (seconds).
+
+        Lamps shine as their dimmers are at ``now``, times ``lamps``.
+        """
+        if self._lamps != (now, lamps):
+            self.scene.dim(now, lamps)
+            self._lamps = (now, lamps)
+        if self.scene.moves and self._time != (now, previous):
             self.scene.move_to(now, previous)
-            self.rays.move(self.scene.triangles, self.scene.moving_box())
+            if self.scene.has_motion:
+                self.rays.move(self.scene.triangles, self.scene.moving_box())
             self._time = (now, previous)
 
     def primary(self, view: View, pixels: I32) -> Hits:
@@ -196,13 +235,30 @@ class Tracer:
         objects = np.where(triangle >= 0, self.scene.triangle_info[triangle, OBJECT], np.int32(-1))
         return Hits(triangle, u, v, objects), directions
 
-    def shade(self, hits: Hits, seeds: Seeds, eye: F32, direct: F32, indirect: F32) -> None:
+    def shade(
+        self,
+        hits: Hits,
+        seeds: Seeds,
+        eye: F32,
+        direct: F32,
+        indirect: F32,
+        specular: F32 | None = None,
+        *,
+        pixel: float = 0.0,
+    ) -> None:
         """One path from each of ``hits``, with the random numbers of ``seeds``, at the time last set.
 
         Writes ``direct`` and ``indirect`` (n, >= 3) float32: radiance towards ``eye`` (3,) float32 divided by the
         albedo; 0 where there is no hit. Depends on nothing but the surface point, the seeds, the time and the side of
         the surface that ``eye`` is on.
+
+        In a scene with specular surfaces also ``specular``, divided by theirs; there it depends on ``eye`` itself, and
+        on ``pixel``, the width of a pixel at distance 1, by which textures are filtered.
         """
+        if self.variant.specular:
+            assert specular is not None
+            self._shade_glossy(hits, seeds, eye, direct, indirect, specular, pixel)
+            return
         count = len(hits.triangle)
         s = self._scratch
         s.reserve(count)
@@ -225,13 +281,41 @@ class Tracer:
         )  # fmt: skip
         self._trace_shadows(shadows, indirect)
 
-    def _trace_shadows(self, count: int, out: F32) -> None:
+    def _shade_glossy(
+        self, hits: Hits, seeds: Seeds, eye: F32, direct: F32, indirect: F32, specular: F32, pixel: float
+    ) -> None:
+        count = len(hits.triangle)
+        s, settings = self._scratch, self.settings
+        s.reserve(count)
+        s.reserve_glossy(count)
+        for image in (direct, indirect, specular):
+            image[:, :3] = 0.0
+        shadows, bounces = self._first_hit(
+            self.tables, hits.triangle, hits.u, hits.v, eye, np.float32(pixel), seeds.pixel, seeds.frame,
+            settings.seed, settings.generator, s.shadow_o, s.shadow_d, s.index, s.light, s.gloss, s.bounce_o,
+            s.bounce_d, s.bounce_index, s.bounce_pdf, s.bounce_cosine, s.bounce_weight,
+        )  # fmt: skip
+        self._trace_shadows(shadows, direct, specular)
+        if bounces == 0:
+            return
+        bounce_o, bounce_d = s.bounce_o[:bounces], s.bounce_d[:bounces]
+        triangle, u, v = self.rays.intersect(bounce_o, bounce_d)
+        shadows = self._second_hit(
+            self.tables, triangle, u, v, bounce_o, bounce_d, s.bounce_index, s.bounce_pdf, s.bounce_cosine,
+            s.bounce_weight, seeds.pixel, seeds.frame, settings.seed, settings.generator, settings.regularize, direct,
+            specular, s.shadow_o, s.shadow_d, s.index, s.light, s.gloss,
+        )  # fmt: skip
+        self._trace_shadows(shadows, indirect, specular)
+
+    def _trace_shadows(self, count: int, out: F32, gloss: F32 | None = None) -> None:
         if count == 0:
             return
         s = self._scratch
         kernels.fill(s.limit, count, SHADOW_END)
         blocked = self.rays.occluded(s.shadow_o[:count], s.shadow_d[:count], s.limit[:count])
         kernels.add_unoccluded(blocked, s.index, s.light, out)
+        if gloss is not None:
+            kernels.add_unoccluded(blocked, s.index, s.gloss, gloss)
 
     def frame(
         self,
@@ -242,30 +326,63 @@ class Tracer:
         now: float = 0.0,
         previous: float = 0.0,
         cut: bool = False,
+        remember: str = "",
+        lamps: float = 1.0,
     ) -> FramePacket:
         """Frame ``index`` of the run at one path per pixel, ``size`` = (width, height).
 
         ``now``, ``previous``: times in seconds of this frame and the one before it. ``cut``: the frame does not
-        continue the one before it.
+        continue the one before it. ``remember``: one of :data:`raytrace.gradients.RULES`, for a frame with temporal
+        gradients, that depends on the frame before if that was traced just before it and remembered as well; "" for
+        one without. ``lamps``: share of their light that lamps give.
         """
         start = time.perf_counter()
-        self.set_time(now, previous)
+        self.set_time(now, previous, lamps)
         view, before = self._views(camera, previous_camera, size)
+        moment = Moment(index, now, size, (self.settings.seed, self.settings.generator))
+        reshading = self._reshading(moment, previous, view, camera, cut, remember) if remember else None
         count = size[0] * size[1]
-        direct, indirect = np.empty((2, count, 4), np.float32)
-        direct[:, 3] = indirect[:, 3] = 1.0
+        signals = np.empty((3 if self.variant.specular else 2, count, 4), np.float32)
+        signals[..., 3] = 1.0
         outputs = self._outputs(count)
 
         def tile(pixels: I32) -> None:
             hits, directions = self._camera_hits(view, pixels, whole_rows=True)
             self._write_guides(view, before, pixels, hits, directions, outputs)
             seeds = Seeds(pixels.astype(np.uint32), np.full(len(pixels), index, np.uint32))
-            part = slice(int(pixels[0]), int(pixels[-1]) + 1)
-            self.shade(hits, seeds, view.eye, direct[part], indirect[part])
+            first = int(pixels[0])
+            part = slice(first, int(pixels[-1]) + 1)
+            if reshading is not None:
+                reshading.replace(first, hits.triangle, hits.u, hits.v, seeds.pixel, seeds.frame)
+            self.shade(hits, seeds, view.eye, *signals[:, part], pixel=view.pixel)
+            if reshading is not None:
+                reshading.note(first, hits.triangle, hits.u, hits.v, signals[0, part], signals[1, part])
 
-        embree = self.for_each_tile(tile, size)
+        embree = self.for_each_tile(tile, size, 4 if reshading is None else 4 * STRATUM)
         timings = {"trace": time.perf_counter() - start, "embree": embree}
-        return self._packet(index, now, size, direct, indirect, outputs, cut, camera, timings)
+        packet = self._packet(index, now, size, signals, outputs, cut, camera, timings)
+        if reshading is None:
+            return packet
+        self._memory.keep(moment, reshading.points)
+        return replace(packet, temporal_gradient=reshading.gradient)
+
+    def _reshading(
+        self, moment: Moment, previous: float, view: View, camera: Camera, cut: bool, rule: str
+    ) -> Reshading:
+        """What carries the points of the last frame into the frame of ``moment``."""
+        return Reshading(
+            self.scene.triangles,
+            self.scene.triangle_info,
+            None if cut else self._memory.recall(moment, previous),
+            moment.index,
+            moment.size,
+            view.eye,
+            view.matrix,
+            view.jitter,
+            camera.pixel_size(moment.size[1]),
+            self.settings.seed,
+            rule == "brightest",
+        )
 
     def reference(
         self,
@@ -275,8 +392,9 @@ class Tracer:
         now: float = 0.0,
         first_sample: int = 0,
         progress: Callable[[float], None] | None = None,
-    ) -> tuple[F64, F64]:
-        """Plain means of ``samples`` independent paths per pixel: direct and indirect, (H, W, 3) float64, demodulated.
+    ) -> tuple[F64, ...]:
+        """Plain means of ``samples`` independent paths per pixel: direct, indirect and, in a scene with specular
+        surfaces, specular, (H, W, 3) float64 each, demodulated.
 
         Uncycled hash numbers under a seed of their own; no clamp, no regularisation. Means over disjoint
         ranges of ``first_sample`` may be averaged.
@@ -284,51 +402,54 @@ class Tracer:
         self.set_time(now, now)
         view, _ = self._views(camera, camera, size)
         count = size[0] * size[1]
-        sums = np.zeros((2, count, 3))
+        signals = 3 if self.variant.specular else 2
+        sums = np.zeros((signals, count, 3))
         done = [0]
 
         def tile(pixels: I32) -> None:
             hits, _ = self._camera_hits(view, pixels, whole_rows=True)
             part = slice(int(pixels[0]), int(pixels[-1]) + 1)
-            direct, indirect = np.empty((2, len(pixels), 3), np.float32)
+            sample_of = np.empty((signals, len(pixels), 3), np.float32)
             seeds = Seeds(pixels.astype(np.uint32), np.empty(len(pixels), np.uint32))
             for sample in range(first_sample, first_sample + samples):
                 seeds.frame[:] = FIRST_SAMPLE + sample
-                self.shade(hits, seeds, view.eye, direct, indirect)
-                sums[0, part] += direct
-                sums[1, part] += indirect
+                self.shade(hits, seeds, view.eye, *sample_of, pixel=view.pixel)
+                sums[:, part] += sample_of
             done[0] += len(pixels)
             if progress is not None:
                 progress(done[0] / count)
 
         with self._reference_numbers():
             self.for_each_tile(tile, size)
-        means = (sums / samples).reshape(2, size[1], size[0], 3)
-        return means[0], means[1]
+        return tuple((sums / samples).reshape(signals, size[1], size[0], 3))
 
-    def reference_frame(self, sample: int, camera: Camera, size: tuple[int, int], now: float) -> FramePacket:
+    def reference_frame(
+        self, sample: int, camera: Camera, size: tuple[int, int], now: float, lamps: float = 1.0
+    ) -> FramePacket:
         """Sample ``sample`` of a reference, whose paths share no number with any frame's, as a frame of its own."""
         with self._reference_numbers():
-            return self.frame(FIRST_SAMPLE + sample, camera, camera, size, now, now)
+            return self.frame(FIRST_SAMPLE + sample, camera, camera, size, now, now, lamps=lamps)
 
     @contextmanager
     def _reference_numbers(self) -> Iterator[None]:
-        """Meanwhile paths are drawn with uncycled hash numbers under a seed of their own."""
+        """Meanwhile paths are drawn with uncycled hash numbers under a seed of their own, without regularisation."""
         normal = self.settings
-        self.settings = replace(normal, seed=(normal.seed + REFERENCE_SEED) & 0xFFFFFFFF, generator=HASH)
+        seed = (normal.seed + REFERENCE_SEED) & 0xFFFFFFFF
+        self.settings = replace(normal, seed=seed, generator=HASH, regularize=False)
         try:
             yield
         finally:
             self.settings = normal
 
-    def for_each_tile(self, work: Callable[[I32], None], size: tuple[int, int]) -> float:
+    def for_each_tile(self, work: Callable[[I32], None], size: tuple[int, int], rows: int = 4) -> float:
         """Run ``work`` on tiles of consecutive pixels; returns seconds inside Embree, averaged over the threads.
 
-        Tiles are whole rows, four or a multiple, so that packets of 4x4 pixels are the same for every tile size.
+        Tiles are whole rows, ``rows`` or a multiple, which is one of four, so that packets of 4x4 pixels are the same
+        for every tile size.
         """
         width, height = size
         count = width * height
-        step = width * 4 * max(1, self.settings.tile // (width * 4))
+        step = width * rows * max(1, self.settings.tile // (width * rows))
         tiles = [np.arange(i, min(i + step, count), dtype=np.int32) for i in range(0, count, step)]
 
         def timed(pixels: I32) -> float:
@@ -361,6 +482,7 @@ class Tracer:
             prev_normal=optional("prev_normal"),
             position=optional("position"),
             prev_position=optional("prev_position"),
+            specular_albedo=optional("specular_albedo"),
         )
 
     def _write_guides(
@@ -376,8 +498,7 @@ class Tracer:
         index: int,
         now: float,
         size: tuple[int, int],
-        direct: F32,
-        indirect: F32,
+        signals: F32,
         out: Outputs,
         cut: bool,
         camera: Camera,
@@ -392,8 +513,7 @@ class Tracer:
         return FramePacket(
             index=index,
             time=now,
-            direct=image(direct),
-            indirect=image(indirect),
+            **{name: image(values) for name, values in zip(ILLUMINATION, signals, strict=False)},
             **guides,
             scene=self.scene.scene.name,
             scene_id=self.scene_id,

@@ -23,18 +23,22 @@ _PLACES = np.stack([radical_inverse(base, _CYCLE + 1)[1:] for base in (2, 3)], a
 class SampleSource(Protocol):
     """What is needed of :class:`raytrace.integrator.Tracer`."""
 
-    def reference_frame(self, sample: int, camera: Camera, size: tuple[int, int], now: float) -> FramePacket: ...
+    def reference_frame(
+        self, sample: int, camera: Camera, size: tuple[int, int], now: float, lamps: float
+    ) -> FramePacket: ...
 
 
 @dataclass(frozen=True)
 class StillView:
     """``camera`` without jitter; ``size`` (width, height) in pixels; ``time`` of the scene in seconds. ``filtered``:
-    the mean over the pixels' squares (a box filter) instead of their centres, as jittered frames converge to."""
+    the mean over the pixels' squares (a box filter) instead of their centres, as jittered frames converge to.
+    ``lamps``: share of their light that lamps give."""
 
     camera: Camera
     size: tuple[int, int]
     time: float
     filtered: bool
+    lamps: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -64,7 +68,7 @@ class StillReference:
         camera = self.view.camera
         if self.view.filtered:
             camera = camera.with_jitter(_place(self._samples))
-        packet = source.reference_frame(self._samples, camera, self.view.size, self.view.time)
+        packet = source.reference_frame(self._samples, camera, self.view.size, self.view.time, self.view.lamps)
         self._sums[self._samples % 2] += packet.radiance()
         self._emits |= packet.emission[..., :3].max(axis=2) > 0.0
         self._samples += 1

@@ -13,6 +13,7 @@ import numpy as np
 
 from raytrace.compilation import device, inlined
 from raytrace.compiled import FACE_NORMAL, NORMALS, CompiledScene
+from raytrace.directional_albedo import table
 from raytrace.textures import SRGB_TO_LINEAR, level_for, lookup
 
 _ZERO, _ONE = np.float32(0.0), np.float32(1.0)
@@ -28,6 +29,9 @@ class Tables(NamedTuple):
     base_color: Any
     emission: Any
     material_info: Any
+    gloss: Any
+    reflectance: Any
+    """Table of :mod:`raytrace.directional_albedo`, or one of a single entry where nothing is specular."""
     texels: Any
     levels: Any
     decode: Any
@@ -37,6 +41,11 @@ class Tables(NamedTuple):
     light_pdf: Any
     light_density: Any
     sky: Any
+    punctual: Any
+    env_texels: Any
+    env_rows: Any
+    env_columns: Any
+    env_turn: Any
     far: Any
     """Length of a shadow ray to the sky: out of the scene from anywhere in it, in its own units."""
     prev_triangles: Any
@@ -49,6 +58,13 @@ class Variant(NamedTuple):
     textured: bool
     sky: bool
     moving: bool
+    lamps: bool
+    """Triangles that emit."""
+    punctual: bool
+    """Lights without a surface."""
+    environment: bool
+    specular: bool = False
+    """Metals and gloss."""
 
 
 def tables_of(scene: CompiledScene) -> Tables:
@@ -61,6 +77,8 @@ def tables_of(scene: CompiledScene) -> Tables:
         scene.base_color,
         scene.emission,
         scene.material_info,
+        scene.gloss,
+        table() if scene.has_specular else np.zeros((1, 1, 3), np.float32),
         scene.textures.texels,
         scene.textures.levels,
         SRGB_TO_LINEAR,
@@ -70,6 +88,11 @@ def tables_of(scene: CompiledScene) -> Tables:
         lights.pdf,
         lights.density,
         lights.sky,
+        lights.punctual,
+        lights.environment.texels,
+        lights.environment.rows,
+        lights.environment.columns,
+        np.float32(lights.environment.turn),
         np.float32(max(1e8, 8.0 * scene.extent)),
         scene.prev_triangles,
         scene.static_count,
@@ -77,7 +100,15 @@ def tables_of(scene: CompiledScene) -> Tables:
 
 
 def variant_of(scene: CompiledScene) -> Variant:
-    return Variant(scene.has_textures, scene.lights.has_sky, scene.has_motion)
+    return Variant(
+        textured=scene.has_textures,
+        sky=scene.lights.has_sky,
+        moving=scene.has_motion,
+        lamps=len(scene.lights.triangles) > 0,
+        punctual=len(scene.scene.lights) > 0,
+        environment=scene.scene.environment is not None,
+        specular=scene.has_specular,
+    )
 
 
 @device

@@ -22,7 +22,7 @@ _FRAMES_PER_SAMPLE: Final = 3
 """After so many frames the reference gets its turn even if the next frame is waited for."""
 
 
-class FrameSource(SampleSource, Protocol):
+class FrameSource(Protocol):
     """What the worker needs of :class:`raytrace.integrator.Tracer`."""
 
     def frame(
@@ -34,6 +34,8 @@ class FrameSource(SampleSource, Protocol):
         now: float,
         previous: float,
         cut: bool,
+        remember: str,
+        lamps: float,
     ) -> FramePacket: ...
 
 
@@ -42,7 +44,8 @@ class Request:
     """What the next frame shows.
 
     ``camera`` is without jitter, which ``jitter`` asks for. ``size``: (width, height) in pixels. ``time``: the scene's,
-    in seconds. ``cut``: the frame does not continue the one before it.
+    in seconds. ``cut``: the frame does not continue the one before it. ``remember``, ``lamps``: as in
+    :meth:`raytrace.integrator.Tracer.frame`.
     """
 
     camera: Camera
@@ -50,6 +53,8 @@ class Request:
     time: float = 0.0
     jitter: bool = False
     cut: bool = False
+    remember: str = ""
+    lamps: float = 1.0
 
 
 class Worker:
@@ -64,12 +69,18 @@ class Worker:
     Motion vectors lead to the frame traced before, whenever that was: its camera and time are remembered here. A frame
     is marked as a cut if it is the first, differs in size from the one before, or is asked to be.
 
+    ``samples``: makes the samples of references; None: there are none (:meth:`accumulate`).
     ``notify`` is called from the worker's thread whenever :meth:`take` has something to return; it must not raise.
     All other methods belong to one thread. ``with Worker(...)`` or :meth:`close` ends the worker's thread.
     """
 
-    def __init__(self, tracer: FrameSource, notify: Callable[[], None] | None = None) -> None:
-        self._tracer, self._notify = tracer, notify
+    def __init__(
+        self,
+        tracer: FrameSource,
+        notify: Callable[[], None] | None = None,
+        samples: SampleSource | None = None,
+    ) -> None:
+        self._tracer, self._notify, self._samples = tracer, notify, samples
         self._requests: SimpleQueue[Request | None] = SimpleQueue()
         self._outcomes: SimpleQueue[FramePacket | BaseException] = SimpleQueue()
         self._busy = False
@@ -110,7 +121,7 @@ class Worker:
 
         What there is of it is in ``snapshot``, of the view accumulated last or, for a moment, of the one before.
         """
-        self._view = view
+        self._view = None if self._samples is None else view
 
     def take(self, timeout: float | None = 0.0) -> FramePacket | None:
         """The frame submitted, or None if it is not ready within ``timeout`` seconds (None: wait for it).
@@ -167,10 +178,11 @@ class Worker:
 
     def _refine(self, view: StillView) -> None:
         """Add a sample to the reference of ``view``; what goes wrong is raised where the next frame is waited for."""
+        assert self._samples is not None
         if self._reference is None or self._reference.view != view:
             self._reference = StillReference(view)
         try:
-            self.snapshot = self._reference.refine(self._tracer)
+            self.snapshot = self._reference.refine(self._samples)
         except BaseException as error:
             self._view, self._trouble = None, error
 
@@ -180,7 +192,15 @@ class Worker:
         before = request if cut or last is None else last
         camera = request.camera.with_jitter(jitter_of(self._index)) if request.jitter else request.camera
         packet = self._tracer.frame(
-            self._index, camera, before.camera, request.size, request.time, before.time, cut=cut
+            self._index,
+            camera,
+            before.camera,
+            request.size,
+            request.time,
+            before.time,
+            cut=cut,
+            remember=request.remember,
+            lamps=request.lamps,
         )
         self._index += 1
         self._last = request

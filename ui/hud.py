@@ -136,7 +136,7 @@ def _times(status: Status) -> None:
     filtering = sum(row.milliseconds for row in status.passes)
     longest = max(status.trace_ms, filtering, 1e-6)
     with widgets.font_size(theme.SMALL):
-        _time(Branch("tracing", status.trace_ms), longest)
+        _time(Branch(status.work, status.trace_ms), longest)
         if status.passes:
             _time(Branch("filters", filtering, tuple(branches(status.passes))), longest, opened=2)
 

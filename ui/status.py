@@ -16,9 +16,10 @@ class Status:
     """``renderer``: GL_RENDERER. ``size``: of the picture, (width, height) in pixels. ``triangles``: of the scene; 0
     where nobody says.
 
-    ``fps``: pictures a second. ``trace_ms``: median time of tracing a frame. ``passes``: what the profiler measured, in
-    order; empty while the panel is hidden, because measuring takes time on software renderers. ``bad``: noisy samples
-    and pixels of the picture that were NaN or infinite in the last frame; None where nobody counts them.
+    ``fps``: pictures a second. ``trace_ms``: median time of tracing a frame, or of other ``work`` that brings it.
+    ``passes``: what the profiler measured, in order; empty while the panel is hidden, because measuring takes time on
+    software renderers. ``bad``: noisy samples and pixels of the picture that were NaN or infinite in the last frame;
+    None where nobody counts them.
 
     ``progress``: what is being prepared in the background, "" for nothing. ``errors``: shaders that do not compile as
     they are on disk now, and scenes that could not be opened.
@@ -38,6 +39,7 @@ class Status:
     triangles: int = 0
     fps: float = 0.0
     trace_ms: float = 0.0
+    work: str = "tracing"
     passes: list[Row] = field(default_factory=list)
     bad: tuple[int, int] | None = None
     progress: str = ""

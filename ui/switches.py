@@ -51,7 +51,7 @@ def uses(state: State, section: str) -> bool:
             return state.denoiser not in UNFILTERED
         case "firefly":
             return state.denoiser != "reference"
-    return section in (state.section, "display", "render")
+    return section in (*state.sections, "display", "render")
 
 
 def _target(binding: Binding) -> str:

@@ -33,23 +33,15 @@ and 1 % more in the Cornell box, where hardly anything is disoccluded. The other
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any
+
 from config import Svgf
 from gl.graph import FragmentPass, Graph, In, Out, Tex, Uniform
-from gl.passes.temporal import REPROJECTION, Guides, accumulate, reproject
-
-
-class Variance(FragmentPass):
-    """Replace the temporal variance by a spatial estimate where the history is shorter than four frames (sec. 4.2)."""
-
-    shader = "svgf/variance.frag"
-    in_color = In("rgb: irradiance; a: standard deviation over time")
-    in_moments = In("first and second moment of luminance", optional=True)
-    in_surface = In("xyz: shading normal, world; w: depth, scene units")
-    in_gradient = In("depth change per pixel, scene units")
-    in_reprojection = In(REPROJECTION, optional=True)
-    out_color = Out("rgba16f", "rgb: irradiance, unchanged unless PREFILTER; a: standard deviation")
-    u_sigma_z = Uniform("float", "> 0, depth edge-stopping")
-    u_pixel_size = Uniform("float", "> 0, scene units a pixel is wide at depth 1")
+from gl.passes.display import GLOSSY
+from gl.passes.temporal import REPROJECTION, Change, Guides, reproject
+from gl.passes.variance import GLOSS, estimate
 
 
 class Atrous(FragmentPass):
@@ -67,66 +59,93 @@ class Atrous(FragmentPass):
     u_sigma_l = Uniform("float", "> 0, luminance edge-stopping in standard deviations")
     u_pixel_size = Uniform("float", "> 0, scene units a pixel is wide at depth 1")
 
-    def __init__(self, p: Svgf, step: int, pixel_size: float, raw: bool = False) -> None:
+    def __init__(self, p: Svgf, step: int, pixel_size: float, raw: bool = False, glossy: bool = False) -> None:
         # A power of two is squared into place: pow() costs more than seven products.
         squarings = p.sigma_n.bit_length() - 1
+        gloss: dict[str, Any] = {"u_sigma_r": p.sigma_r} if glossy else {}
         super().__init__(
             defines={
                 "STEP": step,
                 "SIGMA_N_SQUARINGS": squarings if p.sigma_n == 1 << squarings else -1,
                 "LUMINANCE_STOP": int(p.variance_guided),
                 "RAW": int(raw),
+                **(GLOSSY if glossy else {}),
             },
             u_accumulated_variance=p.alpha / (2.0 - p.alpha),
             u_sigma_z=p.sigma_z,
             u_sigma_n=float(p.sigma_n),
             u_sigma_l=p.sigma_l * (p.first_sigma_l if step == 1 else 1.0),
             u_pixel_size=pixel_size,
+            **gloss,
         )
 
 
-def svgf(g: Graph, signals: dict[str, Tex], guides: Guides, p: Svgf, pixel_size: float) -> dict[str, Tex]:
-    """Filter each of ``signals`` (noisy irradiance by name, "direct", "indirect" or "both"); returns the clean ones.
+class GlossyAtrous(Atrous):
+    """The same for specular light, in which only surfaces of the same roughness have a part."""
+
+    in_specular_albedo = In(GLOSS)
+    u_sigma_r = Uniform("float", "> 0, roughness edge-stopping")
+
+    def __init__(self, p: Svgf, step: int, pixel_size: float, raw: bool = False) -> None:
+        super().__init__(p, step, pixel_size, raw, glossy=True)
+
+
+def svgf(
+    g: Graph,
+    signals: dict[str, Tex],
+    guides: Guides,
+    p: Svgf,
+    pixel_size: float,
+    method: str = "svgf",
+    changes: Mapping[str, Change] = MappingProxyType({}),
+    specular_albedo: Tex | None = None,
+) -> dict[str, Tex]:
+    """Filter each of ``signals`` (noisy irradiance by name, "direct", "indirect", "specular", or "both" for all as
+    one); returns the clean ones. ``specular_albedo`` (:data:`GLOSS`) steers the filter of specular light.
+
+    ``method``: whose passes and histories these are. ``changes``: what is known of each signal's change of light.
 
     All of them share one reprojection. Histories are named by the set of signals, so that filtering them together
     after filtering them apart begins with a new history, as it must; and by whether the signals hold the albedo.
     """
-    names = "svgf." + "+".join(signals) + ("" if p.demodulate else ".radiance")
-    with g.scope("svgf"):
+    names = f"{method}." + "+".join(signals) + ("" if p.demodulate else ".radiance")
+    with g.scope(method):
         found = reproject(g, guides, names, p, pixel_size) if p.temporal else None
         clean: dict[str, Tex] = {}
         for signal, noisy in signals.items():
             with g.scope(signal):
-                clean[signal] = _filter_signal(g, f"{names}.{signal}", noisy, found, guides, p, pixel_size)
+                change = changes.get(signal)
+                gloss = specular_albedo if signal == "specular" else None
+                name = f"{names}.{signal}"
+                clean[signal] = _filter_signal(g, name, noisy, found, guides, p, pixel_size, change, gloss)
         return clean
 
 
 def _filter_signal(
-    g: Graph, name: str, noisy: Tex, reprojection: Tex | None, guides: Guides, p: Svgf, pixel_size: float
+    g: Graph,
+    name: str,
+    noisy: Tex,
+    reprojection: Tex | None,
+    guides: Guides,
+    p: Svgf,
+    pixel_size: float,
+    change: Change | None,
+    gloss: Tex | None,
 ) -> Tex:
-    x = noisy
-    estimate: dict[str, Tex] = {}
-    history = None
-    if reprojection is not None:
-        history = g.history(name, "rgba16f")
-        x, moments = accumulate(g, x, reprojection, history, p, clamp=p.clamp)
-        estimate = {"in_moments": moments, "in_reprojection": reprojection}
-    # Without time there is no other variance than the one in space; without guidance by variance there is none at all.
-    shape = {"in_surface": guides.surface, "in_gradient": guides.gradient}
-    if p.variance_guided:
-        prefilter = {"PREFILTER": 1} if p.prefilter else None
-        stage = Variance(u_sigma_z=p.sigma_z, u_pixel_size=pixel_size, defines=prefilter)
-        unfiltered, x = x, g.add(stage, in_color=x, **shape, **estimate).out_color
-    else:
-        unfiltered = x
+    history = g.history(name, "rgba16f") if reprojection is not None else None
+    unfiltered, x, length = estimate(g, noisy, reprojection, history, guides, p, pixel_size, change, gloss)
     if history is not None and p.feedback < 0:
         g.feed(history, unfiltered)
-    length: dict[str, Tex] = {}
-    if reprojection is not None and p.variance_guided and p.accumulated_variance:
-        length = {"in_reprojection": reprojection}
+    atrous = Atrous if gloss is None else GlossyAtrous
+    shape = {"in_surface": guides.surface, "in_gradient": guides.gradient}
+    if gloss is not None:
+        shape["in_specular_albedo"] = gloss
+    mean: dict[str, Tex] = {}
+    if length is not None and p.variance_guided and p.accumulated_variance:
+        mean = {"in_reprojection": length}
     for i in range(p.iterations):
-        iteration = Atrous(p, 1 << i, pixel_size, raw=x is noisy)
-        x = g.add(iteration, f"atrous{i}", in_color=x, **shape, **(length if i == 0 else {})).out_color
+        iteration = atrous(p, 1 << i, pixel_size, raw=x is noisy)
+        x = g.add(iteration, f"atrous{i}", in_color=x, **shape, **(mean if i == 0 else {})).out_color
         if history is not None and i == p.feedback:
             g.feed(history, x)  # no copy: x is written into the history's other half
     return x

@@ -47,7 +47,7 @@ LAYERS = [
     layer("ui", "ui assets bench.judge gl raytrace config parameter console errors images session", EMBREE),
     layer(
         "bench",
-        "assets bench gl raytrace config parameter console errors session storage",
+        "assets bench gl raytrace config parameter console errors images session storage",
         OPENGL | WINDOWS | {"embreex"},
     ),
     layer(

@@ -26,7 +26,9 @@ class Noise:
         self._sigma, self._lit = sigma, lit
         self.cameras: list[Camera] = []
 
-    def reference_frame(self, sample: int, camera: Camera, size: tuple[int, int], now: float) -> FramePacket:
+    def reference_frame(
+        self, sample: int, camera: Camera, size: tuple[int, int], now: float, lamps: float
+    ) -> FramePacket:
         self.cameras.append(camera)
         shape = (size[1], size[0], 4)
         light = (0.5 + self._sigma * self._rng.standard_normal(shape)).astype(np.float32)

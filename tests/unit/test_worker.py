@@ -34,6 +34,8 @@ class Call:
     now: float
     previous: float
     cut: bool
+    remember: str
+    lamps: float
 
 
 class FakeTracer:
@@ -60,7 +62,9 @@ class FakeTracer:
         gradient = np.zeros((call.size[1], call.size[0], 2), np.float32)
         return FramePacket(call.index, call.now, image, image, image, image, image, gradient, image, cut=call.cut)
 
-    def reference_frame(self, sample: int, camera: Camera, size: tuple[int, int], now: float) -> FramePacket:
+    def reference_frame(
+        self, sample: int, camera: Camera, size: tuple[int, int], now: float, lamps: float
+    ) -> FramePacket:
         if self.sample_error is not None:
             error, self.sample_error = self.sample_error, None
             raise error
@@ -83,7 +87,7 @@ def trace(worker: Worker, request: Request) -> FramePacket:
 
 def test_frames_are_numbered_and_traced_in_the_workers_thread():
     tracer = FakeTracer()
-    with Worker(tracer) as worker:
+    with Worker(tracer, samples=tracer) as worker:
         packets = [trace(worker, Request(CAMERA, SIZE, time)) for time in (0.0, 0.5, 0.5)]
     assert [(p.index, p.time) for p in packets] == [(0, 0.0), (1, 0.5), (2, 0.5)]
     assert tracer.threads == {"tracer"}
@@ -91,11 +95,12 @@ def test_frames_are_numbered_and_traced_in_the_workers_thread():
 
 def test_motion_leads_to_the_frame_traced_before():
     tracer = FakeTracer()
-    with Worker(tracer) as worker:
+    with Worker(tracer, samples=tracer) as worker:
         for step, time in ((0.0, 2.0), (1.0, 2.25), (7.0, 3.0)):
             trace(worker, Request(at(step), SIZE, time))
     assert [(c.camera.position[0], c.previous_camera.position[0]) for c in tracer.calls] == [(0, 0), (1, 0), (7, 1)]
     assert [(c.now, c.previous) for c in tracer.calls] == [(2.0, 2.0), (2.25, 2.0), (3.0, 2.25)]
+    assert {(c.remember, c.lamps) for c in tracer.calls} == {("", 1.0)}
 
 
 def test_the_first_frame_is_a_cut_and_so_are_one_of_another_size_and_one_that_is_asked_to_be():
@@ -107,7 +112,7 @@ def test_the_first_frame_is_a_cut_and_so_are_one_of_another_size_and_one_that_is
         Request(at(3), (8, 6), 3.0, cut=True),
         Request(at(4), (8, 6), 4.0),
     ]
-    with Worker(tracer) as worker:
+    with Worker(tracer, samples=tracer) as worker:
         packets = [trace(worker, request) for request in requests]
     assert [p.cut for p in packets] == [True, False, True, True, False]
     for call in tracer.calls:
@@ -118,7 +123,7 @@ def test_the_first_frame_is_a_cut_and_so_are_one_of_another_size_and_one_that_is
 
 def test_jitter_moves_the_camera_but_not_the_one_before():
     tracer = FakeTracer()
-    with Worker(tracer) as worker:
+    with Worker(tracer, samples=tracer) as worker:
         for jitter in (True, True, False):
             trace(worker, Request(CAMERA, SIZE, jitter=jitter))
     assert [c.camera.jitter for c in tracer.calls] == [jitter_of(0), jitter_of(1), (0.0, 0.0)]
@@ -128,7 +133,7 @@ def test_jitter_moves_the_camera_but_not_the_one_before():
 def test_the_caller_works_while_a_frame_is_traced_and_is_told_when_it_is_ready():
     tracer, ready = FakeTracer(), threading.Event()
     tracer.gate.clear()
-    with Worker(tracer, ready.set) as worker:
+    with Worker(tracer, ready.set, tracer) as worker:
         busy = [worker.busy]
         worker.submit(Request(CAMERA, SIZE))
         assert worker.take() is None
@@ -153,7 +158,7 @@ def test_one_frame_at_a_time():
 
 def test_errors_surface_where_the_frame_is_taken_and_the_frame_after_continues_nothing():
     tracer = FakeTracer()
-    with Worker(tracer) as worker:
+    with Worker(tracer, samples=tracer) as worker:
         trace(worker, Request(at(0), SIZE))
         tracer.error = MemoryError("no room for the rays")
         worker.submit(Request(at(1), SIZE))
@@ -168,7 +173,7 @@ def test_errors_surface_where_the_frame_is_taken_and_the_frame_after_continues_n
 def test_closing_waits_for_the_frame_under_way_and_leaves_no_thread():
     before = threading.active_count()
     tracer = FakeTracer()
-    worker = Worker(tracer)
+    worker = Worker(tracer, samples=tracer)
     tracer.gate.clear()
     worker.submit(Request(CAMERA, SIZE))
     opener = threading.Timer(0.05, tracer.gate.set)
@@ -187,7 +192,7 @@ def test_the_same_frames_as_without_a_thread():
     with Tracer(compiled, Settings(threads=1)) as tracer:
         shot = Shot(compiled, tracer, (16, 9), "flight", animate=True)
         expected = [shot.frame(index) for index in range(3)]
-        with Worker(tracer) as worker:
+        with Worker(tracer, samples=tracer) as worker:
             found = [trace(worker, Request(shot.camera(i), (16, 9), i / FPS)) for i in range(3)]
     for one, other in zip(expected, found, strict=True):
         assert one.cut == other.cut
@@ -216,7 +221,7 @@ def next_frame(worker: Worker) -> None:
 
 def test_a_reference_grows_while_no_frame_is_wanted():
     tracer = FakeTracer()
-    with Worker(tracer) as worker:
+    with Worker(tracer, samples=tracer) as worker:
         worker.accumulate(VIEW)
         next_frame(worker)
         snapshot = samples_of(worker, 5)
@@ -227,7 +232,7 @@ def test_a_reference_grows_while_no_frame_is_wanted():
 
 def test_a_reference_gets_its_turn_however_busy_the_worker_is():
     tracer = FakeTracer()
-    with Worker(tracer) as worker:
+    with Worker(tracer, samples=tracer) as worker:
         worker.accumulate(VIEW)
         for _ in range(24):
             next_frame(worker)
@@ -236,7 +241,7 @@ def test_a_reference_gets_its_turn_however_busy_the_worker_is():
 
 def test_another_view_begins_anew_and_none_forgets():
     tracer = FakeTracer()
-    with Worker(tracer) as worker:
+    with Worker(tracer, samples=tracer) as worker:
         worker.accumulate(VIEW)
         next_frame(worker)
         samples_of(worker, 3)
@@ -258,7 +263,7 @@ def test_another_view_begins_anew_and_none_forgets():
 
 def test_trouble_with_the_reference_is_raised_with_the_next_frame():
     tracer = FakeTracer()
-    with Worker(tracer) as worker:
+    with Worker(tracer, samples=tracer) as worker:
         tracer.sample_error = MemoryError("too large")
         worker.accumulate(VIEW)
 
@@ -275,7 +280,7 @@ def test_frames_do_not_depend_on_the_reference_between_them():
     scene = compile_scene(assets.build("cornell"))
     pictures = []
     for wanted in (None, StillView(scene.scene.camera, (16, 9), 0.0, True)):
-        with Tracer(scene, Settings(threads=1)) as tracer, Worker(tracer) as worker:
+        with Tracer(scene, Settings(threads=1)) as tracer, Worker(tracer, samples=tracer) as worker:
             worker.accumulate(wanted)
             for _ in range(4):
                 worker.submit(Request(scene.scene.camera, (16, 9)))

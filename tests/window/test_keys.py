@@ -6,11 +6,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import assets
+from raytrace.camera_path import read_keyframes
+from raytrace.shot import FPS
 from tests.window.desktop import F32, START_SECONDS, STILL, App, application, difference, plan, roughness, wait_for
 from ui.keys import BINDINGS, Binding
 
@@ -149,6 +152,20 @@ def animation(app: App) -> None:
     assert difference(stopped, app.settled()) < STILL
 
 
+def lamps(app: App) -> None:
+    """A-SVGF shows the dark at once, SVGF fades: three pictures after the key tell them apart."""
+    shares = {}
+    for key, denoiser in (("1", "svgf"), ("3", "asvgf")):
+        app.press(key)
+        app.await_passes(plan(denoiser))
+        before = app.settled().mean()
+        app.ask("o", "lamps off")
+        shares[denoiser] = [app.picture().mean() / before for _ in range(3)]
+        app.ask("o", "lamps on")
+        assert abs(app.settled().mean() / before - 1.0) < 0.05
+    assert shares["asvgf"][-1] < 0.05 < shares["svgf"][-1] < 0.95, shares
+
+
 def single_step(app: App) -> None:
     app.ask("F6", "render.jitter = off")
     with albedo(app) as another:
@@ -253,6 +270,20 @@ def screenshot(app: App) -> None:
     assert f"\n{name}\n" in app.stdout()
 
 
+def camera_path(app: App) -> None:
+    app.ask("c", "recording the camera's path")
+    app.hold("d", 0.4)
+    name = app.ask("c", r"^frame \d+: saved (.*camera_\d+\.toml)$")[1]
+    keys, _ = read_keyframes(Path(name))
+    assert len(keys) >= 2
+    assert [key.time for key in keys] == [index / FPS for index in range(len(keys))]
+    first, last = keys[0].camera, keys[-1].camera
+    assert first == assets.build("cornell").camera
+    way = np.array(last.position) - first.position
+    assert way @ first.basis()[0] > 0.1
+    assert f"\n{name}\n" in app.stdout()
+
+
 def let_go(app: App) -> None:
     """While the mouse turns the camera; a later test has the other meaning of Escape."""
     app.xdotool("mousemove", "--window", app.window, 320, 100, "mousedown", 3, "sleep", 0.3)
@@ -303,6 +334,7 @@ CHECKS: dict[str, Callable[[App], None]] = {
     "0": method("0", "none"),
     "1": method("1", "svgf"),
     "2": method("2", "bmfr"),
+    "3": method("3", "asvgf"),
     "TAB": previous,
     "P": stage("p", "svgf.preset=paper", "svgf.preset=reference", "svgf.preset=best"),
     "F1": stage("F1", "svgf.temporal=false", "svgf.temporal=true"),
@@ -320,9 +352,11 @@ CHECKS: dict[str, Callable[[App], None]] = {
     "DOWN": exposure("Down", "Up", -1),
     "L": stage("l", "display.auto_exposure=true", "display.auto_exposure=false"),
     "SPACE": animation,
+    "O": lamps,
     "PERIOD": single_step,
     "N": next_scene,
     "R": camera_home,
+    "C": camera_path,
     "H": history,
     "B": next_texture,
     "V": texture_before,

@@ -1,6 +1,7 @@
 // Blend this frame's sample with the history of the same surface. Koskela et al. 2019, preprocessing.
 //
 // Reprojection and blending in one: both read the same texels. bmfr/accumulate_fit.frag blends by the same decisions.
+// ADAPTIVE: where light has changed, the history follows it and counts for less (Schied et al. 2018).
 
 #include "common/finite.glsl"
 #include "common/octahedral.glsl"
@@ -13,6 +14,9 @@ uniform sampler2D in_motion;  // uv offset, expected previous depth, object id
 uniform sampler2D in_surface; // normal, depth
 #if HAS_IN_PREV_NORMAL
 uniform sampler2D in_prev_normal;
+#endif
+#ifdef ADAPTIVE
+uniform sampler2D in_lambda; // x: how much of the history is void; z: factor by which the light has changed
 #endif
 uniform sampler2D prev_color; // as out_color
 uniform sampler2D prev_guide; // as out_guide
@@ -93,7 +97,15 @@ void main() {
         history = floor(history + 0.5);
 #endif
         float share = max(1.0 / (history + 1.0), u_alpha);
-        c = mix(color / total, c, usable ? share : 0.0);
+        color /= total;
+#ifdef ADAPTIVE
+        vec4 change = texelFetch(in_lambda, p / 3, 0);
+        float void_share = clamp(change.x, 0.0, 1.0);
+        color *= change.z;
+        share = mix(share, 1.0, void_share);
+        history = max((history + 1.0) / (1.0 + void_share * history) - 1.0, 0.0);
+#endif
+        c = mix(color, c, usable ? share : 0.0);
     }
     float count = hit ? history + (usable ? 1.0 : 0.0) : 0.0;
     out_color = round_to_half(vec4(c, floor(count + 0.5)));
