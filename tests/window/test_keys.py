@@ -344,6 +344,14 @@ def recording(app: App) -> None:
     assert not (folder / f"color{sequence.frames}.exr").exists()
 
 
+def error_map(app: App) -> None:
+    before = app.settled()
+    app.ask("m", "error map on$")
+    wait_for(lambda: difference(before, app.picture()) > 0.05, "the map of the errors instead of the picture")
+    app.ask("m", "error map off$")
+    wait_for(lambda: difference(before, app.picture()) < 2 * STILL, "the picture again")
+
+
 CHECKS: dict[str, Callable[[App], None]] = {
     "0": method("0", "none"),
     "1": method("1", "svgf"),
@@ -376,6 +384,7 @@ CHECKS: dict[str, Callable[[App], None]] = {
     "V": texture_before,
     "X": split,
     "I": overlay("i", "inspect"),
+    "M": error_map,
     "EQUAL": resolution("equal", "minus", (213, 120)),
     "MINUS": resolution("minus", "equal", (120, 68)),
     "G": overlay("g", "hud"),
