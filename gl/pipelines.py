@@ -43,6 +43,7 @@ SECTIONS_OF: dict[str, tuple[str, ...]] = {
     "none": (),
     "accumulate": ("svgf",),
     "svgf": ("svgf",),
+    "asvgf": ("asvgf",),
     "bmfr": ("bmfr",),
     **{denoiser: (denoiser.partition("-")[0], "spatial") for denoiser in SPATIAL},
     "reference": (),

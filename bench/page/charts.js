@@ -2,7 +2,7 @@
 
 const FONT = { family: "system-ui, -apple-system, 'Segoe UI', Roboto, Arial, sans-serif", size: 13, color: "#1d2129" };
 const CONFIG = { displaylogo: false, responsive: true, displayModeBar: window.innerWidth < 640 ? false : "hover", modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"] };
-const AXIS = { gridcolor: "#e6e9ed", linecolor: "#b9c0ca", zeroline: false, ticks: "outside", tickcolor: "#b9c0ca", ticklen: 4 };
+const AXIS = { automargin: true, gridcolor: "#e6e9ed", linecolor: "#b9c0ca", zeroline: false, ticks: "outside", tickcolor: "#b9c0ca", ticklen: 4 };
 const narrow = () => window.innerWidth < 640;
 
 function layout(more) {
@@ -88,7 +88,7 @@ function drawScatter() {
   const floorValue = floors && drawn(metric, floors[metric]) > 0 ? [drawn(metric, floors[metric])] : [];
   Plotly.react(place, traces, layout({
     xaxis: { ...AXIS, type: "log", range: ranges[0], title: { text: "ms a frame: tracing + filter" }, ...ticks(methods.map(x)) },
-    yaxis: { ...AXIS, type: "log", range: ranges[1], title: { text: narrow() ? METRICS[metric].label : METRICS[metric].title, standoff: 4 }, ...ticks(methods.map(y).concat(floorValue)) },
+    yaxis: { ...AXIS, type: "log", range: ranges[1], title: { text: narrow() ? METRICS[metric].label : METRICS[metric].title, standoff: 10 }, ...ticks(methods.map(y).concat(floorValue)) },
     shapes, annotations,
   }), CONFIG);
   if (!place.dataset.wired) {
@@ -134,7 +134,7 @@ function drawFrames() {
   Plotly.react("frames", traces, layout({
     showlegend: !narrow(), legend: { font: { size: 11 }, x: 1.01, y: 1 },
     xaxis: { ...AXIS, title: { text: "frame" }, dtick: 2 },
-    yaxis: { ...AXIS, type: "log", title: { text: METRICS[metric].label, standoff: 4 }, ...ticks(all) },
+    yaxis: { ...AXIS, type: "log", title: { text: METRICS[metric].label, standoff: 10 }, ...ticks(all) },
   }), CONFIG);
 }
 const DASHES = ["solid", "dash", "dot", "dashdot"];
@@ -162,7 +162,7 @@ function drawPasses() {
   const place = byId("passes");
   place.style.height = `${(narrow() ? 190 : 120) + 27 * methods.length}px`;
   Plotly.react(place, traces, layout({
-    barmode: "stack", bargap: 0.28, legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0, font: { size: 12 }, traceorder: "normal" }, margin: { l: narrow() ? 112 : 205, r: 12, t: 8, b: 46 },
+    barmode: "stack", bargap: 0.28, legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0, font: { size: 12 }, traceorder: "normal" }, margin: { l: narrow() ? 150 : 205, r: 12, t: 8, b: 46 },
     xaxis: { ...AXIS, title: { text: "ms" } }, yaxis: { automargin: false, tickfont: { size: narrow() ? 10 : 12 } },
   }), CONFIG);
 }
@@ -184,7 +184,7 @@ function drawEvents() {
   Plotly.react("events", traces, layout({
     showlegend: !narrow(), legend: { font: { size: 11 }, x: 1.01, y: 1 },
     xaxis: { ...AXIS, title: { text: `frames after: ${name}` } },
-    yaxis: { ...AXIS, type: "log", title: { text: "RMSE", standoff: 4 }, ...ticks(all) },
+    yaxis: { ...AXIS, type: "log", title: { text: "RMSE", standoff: 10 }, ...ticks(all) },
   }), CONFIG);
   byId("events-say").textContent = `${events.scene}, ${events.size[0]}×${events.size[1]}, ${events.samples.toLocaleString("en")} paths per pixel in the references. ` +
     "The camera rests but for the event. After a disocclusion only what it uncovers counts.";
