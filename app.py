@@ -11,7 +11,7 @@ from typing import Any
 
 import cli
 import config as configuration
-from config import Config
+from config import Config, Surroundings
 from errors import UserError
 
 
@@ -23,7 +23,10 @@ def load_config(args: argparse.Namespace) -> Config:
         changes["width"], changes["height"] = args.size
     if getattr(args, "seed", None) is not None:
         changes["seed"] = args.seed
-    return replace(config, render=replace(config.render, **changes))
+    surroundings = config.surroundings
+    if getattr(args, "environment", None) is not None:
+        surroundings = Surroundings(args.environment, args.environment_strength, args.environment_rotation)
+    return replace(config, render=replace(config.render, **changes), surroundings=surroundings)
 
 
 def has_display() -> bool:

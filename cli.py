@@ -6,6 +6,7 @@ Standard library only, and nothing that compiles or opens a device: ``--help`` a
 from __future__ import annotations
 
 import argparse
+import math
 import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -102,6 +103,45 @@ def _add_denoiser(parser: Parser, known: Sequence[str], text: str) -> None:
 def _add_scene(parser: Parser) -> None:
     parser.add_argument(
         "--scene", default="cornell", metavar="S", help=f"cornell, interior, or a file: {SCENE_FILES} (default cornell)"
+    )
+    _add_environment(parser)
+
+
+def number(flag: str, lowest: float, highest: float) -> Callable[[str], float]:
+    """Reads a finite number in [lowest; highest]; what it returns raises UserError."""
+
+    def read(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not lowest <= value <= highest:
+            raise UserError(f"{flag} {text}: must be a number in [{lowest:g};{highest:g}]")
+        return value
+
+    return read
+
+
+def _add_environment(parser: Parser) -> None:
+    parser.add_argument(
+        "--environment",
+        type=Path,
+        metavar="FILE",
+        help="light from all around: an equirectangular picture, .hdr or .exr, instead of the scene's sky",
+    )
+    parser.add_argument(
+        "--environment-strength",
+        type=number("--environment-strength", 0.0, 1e6),
+        default=1.0,
+        metavar="X",
+        help="what it is multiplied by (default 1)",
+    )
+    parser.add_argument(
+        "--environment-rotation",
+        type=number("--environment-rotation", -360.0, 360.0),
+        default=0.0,
+        metavar="DEG",
+        help="degrees by which it is turned about the y axis, counter-clockwise seen from above (default 0)",
     )
 
 
@@ -287,6 +327,7 @@ def bench_parser() -> Parser:
         "examples:\n  app.py bench --quick\n  app.py bench --scene cornell --out out/cornell.json",
     )
     parser.add_argument("--scene", action="append", metavar="S", help="repeatable (default: cornell and interior)")
+    _add_environment(parser)
     parser.add_argument("--quick", action="store_true", help="small pictures, few samples: does it run, not how fast")
     parser.add_argument("--table", action="store_true", help="print tables: the default, for those who say so")
     _add_size(parser)

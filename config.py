@@ -204,6 +204,19 @@ class Display(Section):
 
 
 @dataclass(frozen=True)
+class Surroundings:
+    """The picture of light from all around that a scene gets instead of its own sky; ``file`` None: none.
+
+    ``strength`` multiplies it; ``rotation``: degrees about the y axis, counter-clockwise seen from above. No section
+    of the file: it goes with a scene, not with the program, and has flags of its own.
+    """
+
+    file: Path | None = None
+    strength: float = 1.0
+    rotation: float = 0.0
+
+
+@dataclass(frozen=True)
 class Config:
     """Every parameter. Immutable and hashable: a changed one is a new Config (``dataclasses.replace``)."""
 
@@ -213,6 +226,7 @@ class Config:
     bmfr: Bmfr = field(default_factory=Bmfr)
     taa: Taa = field(default_factory=Taa)
     display: Display = field(default_factory=Display)
+    surroundings: Surroundings = field(default_factory=Surroundings)
 
 
 SECTIONS: dict[str, type[Section]] = {

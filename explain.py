@@ -34,6 +34,8 @@ WORDS: Final = {
     "lamps": "lamps",
     "specular": "metals and gloss",
     "separable": "separable masking",
+    "punctual": "lights without a surface",
+    "environment": "an environment",
     "positions": "world positions",
 }
 """What the switches of kernels and kinds of scenes mean; one that is not here goes by its own name."""
@@ -85,7 +87,7 @@ class Subject:
 
 def run(config: Config, name: str, denoiser: str, animate: bool, jitter: bool) -> None:
     """Print the explanation of a scene, built in or a file. Raises UserError where there is no such scene."""
-    scene: Scene = find_scene(name, animate)
+    scene: Scene = find_scene(name, animate, config.surroundings)
     tell_notices(scene, animate)
     compiled, tracer = prepare_tracer(scene, config)
     with tracer:
@@ -116,13 +118,23 @@ def scene_section(subject: Subject) -> list[str]:
     lamps = _count(content.lamps, "triangle")
     lamps += f", {content.textured_lamps} by a texture" if content.textured_lamps else ""
     lamps += f", {content.double_sided_lamps} on both sides" if content.double_sided_lamps else ""
-    sky = f"takes {content.sky_share:.0%} of the light samples" if content.sky_share else "none"
+    share = f"takes {content.sky_share:.0%} of the light samples"
+    sky = share if content.sky_share and not content.environment_size else "none"
+    environment = "none"
+    if around := subject.scene.scene.environment:
+        assert content.environment_size is not None
+        environment = (
+            f"{around.name}, {_by(content.environment_size)} texels, {content.environment_bytes:,} bytes; {share}"
+        )
+    punctual = ", ".join(f"{count} {kind}" for kind, count in content.punctual.items()) or "none"
     flat = content.triangles - content.smooth
     rows = [
         ("triangles", f"{content.triangles:,} in {_count(content.objects, 'object')}; {motion}"),
         ("textures", textures),
         ("lamps", lamps if content.lamps else "none"),
+        ("lights", f"{punctual} without a surface" if content.punctual else "none without a surface"),
         ("sky", sky),
+        ("environment", environment),
         ("normals", f"the vertices' on {_count(content.smooth, 'triangle')}, the face's on {flat:,}"),
         ("tables", f"{content.table_bytes:,} bytes of main memory, all that the kernels read"),
     ]

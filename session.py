@@ -5,13 +5,14 @@ from __future__ import annotations
 import re
 import sys
 from contextlib import AbstractContextManager
+from dataclasses import replace
 from pathlib import Path
 from typing import Protocol
 
 import assets
-from config import Config
+from config import Config, Surroundings
 from console import Progress
-from errors import UserError, did_you_mean
+from errors import Notices, UserError, did_you_mean
 from raytrace.camera import Camera
 from raytrace.compile_events import watch_kernels
 from raytrace.compiled import CompiledScene, compile_scene
@@ -19,6 +20,8 @@ from raytrace.integrator import Settings, Tracer
 from raytrace.sampling import HALTON, HASH
 from raytrace.scene import Scene
 from raytrace.shot import Shot, read_camera_path
+
+NOTHING_AROUND = Surroundings()
 
 BYTES_PER_PIXEL = 600
 """Main memory that a frame takes, textures included (a software renderer's are there too): measured with SVGF."""
@@ -55,14 +58,28 @@ class Terminal:
         print(text, file=sys.stderr, flush=True)
 
 
-def find_scene(name: str, animate: bool) -> Scene:
-    """A built-in scene by name, or any file by path. Raises UserError when there is neither."""
+def find_scene(name: str, animate: bool, surroundings: Surroundings = NOTHING_AROUND) -> Scene:
+    """A built-in scene by name, or any file by path, in ``surroundings`` if there are any.
+
+    Raises UserError when there is neither, and for surroundings that cannot be read.
+    """
+    scene = _scene(name, animate, surrounded=surroundings.file is not None)
+    if surroundings.file is None:
+        return scene
+    from raytrace.hdr import load_environment
+
+    notices = Notices()
+    environment = load_environment(surroundings.file, notices, surroundings.strength, surroundings.rotation)
+    return replace(scene, environment=environment, sky=None, notices=(*scene.notices, *notices.lines))
+
+
+def _scene(name: str, animate: bool, surrounded: bool) -> Scene:
     if name in assets.SCENES:
         return assets.build(name, animate)
     if Path(name).suffix or Path(name).exists():
         from raytrace.load import load_scene  # slow to import, and not needed above
 
-        return load_scene(name)
+        return load_scene(name, surrounded)
     raise UserError(
         f"--scene {name}: neither a built-in scene nor a file{did_you_mean(name, assets.SCENES)}",
         f"built in are: {', '.join(assets.SCENES)}",
@@ -115,7 +132,7 @@ def open_shot(
     require_memory(size)
     path = None if camera is None else _camera_path(camera)
     with log.stage(f"{Path(name).name}: reading"):
-        scene = find_scene(name, animate)
+        scene = find_scene(name, animate, config.surroundings)
     tell_notices(scene, animate, log)
     if path is None:
         path = "still" if scene.flight is None else "flight"

@@ -14,6 +14,7 @@ import numpy as np
 
 from raytrace.compilation import device, inlined, kernel
 from raytrace.compiled import FACE_NORMAL, MATERIAL, OBJECT, SMOOTH, SPECULAR
+from raytrace.lights import environment_at
 from raytrace.reflectance import albedos
 from raytrace.surface import footprint_of, seen_from, surface_gloss
 from raytrace.tables import Variant, interpolate, shading_normal, surface_color
@@ -96,7 +97,8 @@ def _write_albedos(textured, tables, out, p, t, material, u, v, pixel, ex, ey, e
 def guide_kernel(variant: Variant, positions: bool) -> Callable[..., Any]:
     """Kernel that writes the noise-free guides of a tile; ``positions``: world positions as well."""
     textured = variant.textured
-    has_sky, moving, specular = variant.sky, variant.moving, variant.specular
+    has_sky, environment = variant.sky, variant.environment
+    moving, specular = variant.moving, variant.specular
 
     @kernel
     def guides(  # type: ignore[no-untyped-def]
@@ -124,6 +126,11 @@ def guide_kernel(variant: Variant, positions: bool) -> Callable[..., Any]:
                 if has_sky:
                     for k in range(3):
                         out.emission[p, k] = tables.sky[k]
+                if environment:
+                    r, g, b, _ = environment_at(tables, directions[i, 0], directions[i, 1], directions[i, 2])
+                    out.emission[p, 0] = r
+                    out.emission[p, 1] = g
+                    out.emission[p, 2] = b
                 out.gradient[p, 0] = _ZERO
                 out.gradient[p, 1] = _ZERO
                 # The sky moves like points at infinity.

@@ -41,7 +41,8 @@ BOUNCE_CONE = np.float32(0.1)  # footprint of a bounce ray's hit per unit of dis
 @cache
 def first_hit_kernel(variant: Variant) -> Callable[..., Any]:
     """Kernel that shades first hits: returns how many shadow and bounce rays it wrote."""
-    textured, lamps, has_sky = variant.textured, variant.lamps, variant.sky
+    textured, lamps, punctual = variant.textured, variant.lamps, variant.punctual
+    has_sky, environment = variant.sky, variant.environment
 
     @kernel
     def first_hit(  # type: ignore[no-untyped-def]
@@ -49,7 +50,7 @@ def first_hit_kernel(variant: Variant) -> Callable[..., Any]:
         shadow_o, shadow_d, shadow_index, shadow_light, bounce_o, bounce_d, bounce_index, bounce_pdf,
     ):  # fmt: skip
         shadows, bounces = 0, 0
-        lights = lamps or has_sky
+        lights = lamps or punctual or has_sky or environment
         for i in range(triangle.shape[0]):
             t = triangle[i]
             if t < 0:
@@ -68,12 +69,13 @@ def first_hit_kernel(variant: Variant) -> Callable[..., Any]:
                 choice, _unused = random_pair(key, frame, PAIR_SELECT, generator)
                 a, b = random_pair(key, frame, PAIR_LIGHT, generator)
                 wx, wy, wz, dx, dy, dz, r, g, bl, density = sample_light(
-                    textured, lamps, has_sky, tables, x, y, z, nx, ny, nz, gx, gy, gz, offset, a, b, choice
-                )
-                if density > _ZERO and r + g + bl > _ZERO:
+                    textured, lamps, punctual, has_sky, environment,
+                    tables, x, y, z, nx, ny, nz, gx, gy, gz, offset, a, b, choice,
+                )  # fmt: skip
+                if density != _ZERO and r + g + bl > _ZERO:
                     # Also the density with which the bounce ray draws this direction.
                     diffuse = (wx * nx + wy * ny + wz * nz) * _INV_PI
-                    scale = diffuse / (density + diffuse)
+                    scale = diffuse / (density + diffuse) if density > _ZERO else -diffuse / density
                     r, g, bl = r * scale, g * scale, bl * scale
                     shadow_o[shadows, 0], shadow_o[shadows, 1], shadow_o[shadows, 2] = ox, oy, oz
                     shadow_d[shadows, 0], shadow_d[shadows, 1], shadow_d[shadows, 2] = dx, dy, dz
@@ -97,7 +99,8 @@ def first_hit_kernel(variant: Variant) -> Callable[..., Any]:
 def second_hit_kernel(variant: Variant) -> Callable[..., Any]:
     """Kernel that shades bounce hits: adds light found by the ray to ``direct``, writes shadow rays; returns how
     many."""
-    textured, lamps, has_sky = variant.textured, variant.lamps, variant.sky
+    textured, lamps, punctual = variant.textured, variant.lamps, variant.punctual
+    has_sky, environment = variant.sky, variant.environment
 
     @kernel
     def second_hit(  # type: ignore[no-untyped-def]
@@ -105,13 +108,14 @@ def second_hit_kernel(variant: Variant) -> Callable[..., Any]:
         direct, shadow_o, shadow_d, shadow_index, shadow_light,
     ):  # fmt: skip
         shadows = 0
-        lights = lamps or has_sky
+        lights = lamps or punctual or has_sky or environment
         for k in range(triangle.shape[0]):
             i = bounce_index[k]
             t = triangle[k]
             if t < 0:
-                if has_sky:
-                    r, g, bl, density = background(has_sky, tables, bounce_pdf[k] * _PI)
+                if has_sky or environment:
+                    dx, dy, dz = bounce_d[k, 0], bounce_d[k, 1], bounce_d[k, 2]
+                    r, g, bl, density = background(has_sky, environment, tables, dx, dy, dz, bounce_pdf[k] * _PI)
                     weight = bounce_pdf[k] / (bounce_pdf[k] + density)
                     direct[i, 0] += r * weight
                     direct[i, 1] += g * weight
@@ -145,11 +149,12 @@ def second_hit_kernel(variant: Variant) -> Callable[..., Any]:
             a, b = random_pair(key, frame, PAIR_SECOND_LIGHT, generator)
             offset = record[OFFSET]
             wx, wy, wz, dx, dy, dz, r, g, bl, density = sample_light(
-                textured, lamps, has_sky, tables, x, y, z, nx, ny, nz, gx, gy, gz, offset, a, b, choice
-            )
-            if density <= _ZERO or r + g + bl <= _ZERO:
+                textured, lamps, punctual, has_sky, environment,
+                tables, x, y, z, nx, ny, nz, gx, gy, gz, offset, a, b, choice,
+            )  # fmt: skip
+            if density == _ZERO or r + g + bl <= _ZERO:
                 continue
-            scale = (wx * nx + wy * ny + wz * nz) * _INV_PI / density
+            scale = (wx * nx + wy * ny + wz * nz) * _INV_PI / abs(density)
             r, g, bl = r * scale, g * scale, bl * scale
             footprint = BOUNCE_CONE * math.sqrt(square)
             ar, ag, ab = surface_color(textured, tables, 0, tables.base_color, t, material, u[k], v[k], footprint)

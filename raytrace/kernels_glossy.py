@@ -44,7 +44,8 @@ _INV_PI = np.float32(1.0 / math.pi)
 @cache
 def first_hit_kernel(variant: Variant, separable: bool) -> Callable[..., Any]:
     """Kernel that shades first hits: returns how many shadow and bounce rays it wrote."""
-    textured, lamps, has_sky = variant.textured, variant.lamps, variant.sky
+    textured, lamps, punctual = variant.textured, variant.lamps, variant.punctual
+    has_sky, environment = variant.sky, variant.environment
 
     @kernel
     def first_hit(  # type: ignore[no-untyped-def]
@@ -53,7 +54,7 @@ def first_hit_kernel(variant: Variant, separable: bool) -> Callable[..., Any]:
         bounce_o, bounce_d, bounce_index, bounce_pdf, bounce_cosine, bounce_weight,
     ):  # fmt: skip
         shadows, bounces = 0, 0
-        lights = lamps or has_sky
+        lights = lamps or punctual or has_sky or environment
         for i in range(triangle.shape[0]):
             t = triangle[i]
             if t < 0:
@@ -90,15 +91,17 @@ def first_hit_kernel(variant: Variant, separable: bool) -> Callable[..., Any]:
                 choice, _unused = random_pair(key, frame, PAIR_SELECT, generator)
                 a, b = random_pair(key, frame, PAIR_LIGHT, generator)
                 wx, wy, wz, dx, dy, dz, r, g, bl, density = sample_light(
-                    textured, lamps, has_sky, tables, x, y, z, nx, ny, nz, gx, gy, gz, offset, a, b, choice
-                )
-                if density > _ZERO and r + g + bl > _ZERO:
+                    textured, lamps, punctual, has_sky, environment,
+                    tables, x, y, z, nx, ny, nz, gx, gy, gz, offset, a, b, choice,
+                )  # fmt: skip
+                if density != _ZERO and r + g + bl > _ZERO:
                     lx, ly, lz = to_local(wx, wy, wz, nx, ny, nz, tx, ty, tz, bx, by, bz)
                     diffuse, lobe, white, bounce = scattered(
                         glossy, separable, vx, vy, vz, lx, ly, lz, alpha, share, base
                     )
-                    # Both techniques at once: the balance heuristic's weight over this one's density.
-                    scale = _ONE / (density + bounce)
+                    # Both techniques at once: the balance heuristic's weight over this one's density. A negative one
+                    # says that no bounce finds this light.
+                    scale = _ONE / (density + bounce) if density > _ZERO else -_ONE / density
                     diffuse, lobe = diffuse * scale, lobe * scale
                     shadow_o[shadows, 0], shadow_o[shadows, 1], shadow_o[shadows, 2] = ox, oy, oz
                     shadow_d[shadows, 0], shadow_d[shadows, 1], shadow_d[shadows, 2] = dx, dy, dz
@@ -153,7 +156,8 @@ def scattered(glossy, separable, vx, vy, vz, lx, ly, lz, alpha, share, base):  #
 def second_hit_kernel(variant: Variant, separable: bool) -> Callable[..., Any]:
     """Kernel that shades bounce hits: adds light found by the ray to ``direct`` and ``specular``, writes shadow rays;
     returns how many."""
-    textured, lamps, has_sky = variant.textured, variant.lamps, variant.sky
+    textured, lamps, punctual = variant.textured, variant.lamps, variant.punctual
+    has_sky, environment = variant.sky, variant.environment
 
     @kernel
     def second_hit(  # type: ignore[no-untyped-def]
@@ -162,14 +166,15 @@ def second_hit_kernel(variant: Variant, separable: bool) -> Callable[..., Any]:
         direct, specular, shadow_o, shadow_d, shadow_index, shadow_light, shadow_gloss,
     ):  # fmt: skip
         shadows = 0
-        lights = lamps or has_sky
+        lights = lamps or punctual or has_sky or environment
         for k in range(triangle.shape[0]):
             i = bounce_index[k]
             t = triangle[k]
             weight = bounce_weight[k]
             if t < 0:
-                if has_sky:
-                    r, g, bl, density = background(has_sky, tables, bounce_cosine[k])
+                if has_sky or environment:
+                    dx, dy, dz = bounce_d[k, 0], bounce_d[k, 1], bounce_d[k, 2]
+                    r, g, bl, density = background(has_sky, environment, tables, dx, dy, dz, bounce_cosine[k])
                     scale = bounce_pdf[k] / (bounce_pdf[k] + density)
                     add_found(direct, specular, i, weight, r * scale, g * scale, bl * scale)
                 continue
@@ -201,11 +206,12 @@ def second_hit_kernel(variant: Variant, separable: bool) -> Callable[..., Any]:
             a, b = random_pair(key, frame, PAIR_SECOND_LIGHT, generator)
             offset = record[OFFSET]
             wx, wy, wz, sx, sy, sz, r, g, bl, density = sample_light(
-                textured, lamps, has_sky, tables, x, y, z, nx, ny, nz, gx, gy, gz, offset, a, b, choice
-            )
-            if density <= _ZERO or r + g + bl <= _ZERO:
+                textured, lamps, punctual, has_sky, environment,
+                tables, x, y, z, nx, ny, nz, gx, gy, gz, offset, a, b, choice,
+            )  # fmt: skip
+            if density == _ZERO or r + g + bl <= _ZERO:
                 continue
-            scale = _ONE / density
+            scale = _ONE / abs(density)
             cosine = (wx * nx + wy * ny + wz * nz) * _INV_PI
             if tables.material_info[material, SPECULAR] != 0:
                 ar, ag, ab, metallic, roughness = surface_gloss(textured, tables, t, material, u[k], v[k], footprint)

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from raytrace.environment import EnvironmentTables, build_environment, no_environment
+from raytrace.punctual import ROW, punctual_rows
 from raytrace.sampling import build_alias
 from raytrace.textures import MAX_LEVELS, sample_bilinear
 
@@ -21,11 +23,11 @@ I32 = NDArray[np.int32]
 
 @dataclass(frozen=True)
 class Lights:
-    """Emissive triangles and the constant sky, chosen in proportion to their power.
+    """Everything that shines, chosen in proportion to its power.
 
-    ``triangles`` (L,) int32; ``threshold``, ``alias``, ``pdf`` the alias table over the L triangles, plus one last
-    entry for the sky where there is one. ``density`` (L,) float32: pdf per area of a point on the triangle.
-    ``sky`` (3,) float32.
+    ``triangles`` (L,) int32; ``threshold``, ``alias``, ``pdf`` the alias table over the L triangles, then the P lights
+    without a surface, and one last entry for the sky or the environment where there is either. ``density`` (L,)
+    float32: pdf per area of a point on the triangle. ``punctual``: see :func:`punctual_rows`. ``sky`` (3,) float32.
     """
 
     triangles: I32
@@ -33,13 +35,16 @@ class Lights:
     threshold: F32
     alias: I32
     pdf: F32
+    punctual: F32
     sky: F32
     has_sky: bool
+    environment: EnvironmentTables
 
 
 def no_lights() -> Lights:
-    none = np.zeros(0, np.float32)
-    return Lights(np.zeros(0, np.int32), none, none, np.zeros(0, np.int32), none, np.zeros(3, np.float32), False)
+    none, index = np.zeros(0, np.float32), np.zeros(0, np.int32)
+    sky, rows = np.zeros(3, np.float32), np.zeros((1, ROW), np.float32)
+    return Lights(index, none, none, index, none, rows, sky, False, no_environment())
 
 
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
@@ -57,13 +62,16 @@ def collect_lights(compiled: CompiledScene, materials: I32) -> Lights:
     power = np.pi * areas * sides * (mean @ _LUMINANCE)
     keep = power > 0.0  # a triangle under a black part of an emissive texture is no light
     triangles, areas, power = triangles[keep], areas[keep], power[keep]
-    sky = np.array(compiled.scene.sky or (0.0, 0.0, 0.0))
-    has_sky = compiled.scene.sky is not None and float(sky.max()) > 0.0
-    if has_sky:
+    scene, radius = compiled.scene, compiled.extent / 2
+    power = np.append(power, [light.power(radius) for light in scene.lights])
+    sky = np.array(scene.sky or (0.0, 0.0, 0.0))
+    has_sky = scene.environment is None and float(sky.max()) > 0.0
+    around = no_environment() if scene.environment is None else build_environment(scene.environment)
+    if has_sky or scene.environment is not None:
         # The power that a sphere around the scene receives, pi R^2 times the radiance times pi.
-        sky_power = np.pi**2 * (compiled.extent / 2) ** 2 * float(sky @ _LUMINANCE)
+        around_power = np.pi**2 * radius**2 * (float(sky @ _LUMINANCE) if has_sky else around.mean)
         total = power.sum()
-        power = np.append(power, min(sky_power, total * _SKY_SHARE / (1 - _SKY_SHARE)) if total > 0 else 1.0)
+        power = np.append(power, min(around_power, total * _SKY_SHARE / (1 - _SKY_SHARE)) if total > 0 else 1.0)
     threshold, alias, pdf = build_alias(power) if len(power) else (np.zeros(0, np.float32),) * 3
     return Lights(
         triangles,
@@ -71,8 +79,10 @@ def collect_lights(compiled: CompiledScene, materials: I32) -> Lights:
         threshold,
         np.asarray(alias, np.int32),
         pdf,
+        punctual_rows(scene.lights, compiled.origin),
         sky.astype(np.float32),
         has_sky,
+        around,
     )
 
 

@@ -33,11 +33,12 @@ _FRAMING_FOV_DEGREES = 45.0
 _MARGIN = 1.02
 
 
-def load_scene(path: str | Path) -> Scene:
+def load_scene(path: str | Path, surrounded: bool = False) -> Scene:
     """Read a scene file. Units and axes stay the file's; vertices are world space, float64.
 
     Without a camera in the file the whole scene is framed, up being +y; without a light it gets a constant white sky of
-    radiance 1. Both, every repair and every simplification are named in ``Scene.notices``.
+    radiance 1, unless it is ``surrounded`` by something that the caller adds. All of that, every repair and every
+    simplification are named in ``Scene.notices``.
     Raises UserError, with the file and what to do, for everything that cannot be read.
     """
     path = Path(path).expanduser()
@@ -52,12 +53,13 @@ def load_scene(path: str | Path) -> Scene:
         materials=tuple(model.materials),
         camera=model.camera or Camera((0.0, 0.0, 0.0), (0.0, 0.0, -1.0)),
         textures=tuple(model.textures),
+        lights=tuple(model.lights),
     )
     camera, sky = model.camera, None
     if camera is None:
         notices.add("no camera in the file: the whole scene is framed")
         camera = framed(scene)
-    if not has_lamp(scene):
+    if not (surrounded or scene.lights or has_lamp(scene)):
         notices.add("no light in the file: a constant white sky is added")
         sky = (1.0, 1.0, 1.0)
     scene = with_front_lamps(scene, notices)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raytrace.camera import Camera
+from raytrace.punctual import PunctualLight
 from raytrace.scene import Material, Mesh, Texture
 
 F64 = NDArray[np.float64]
@@ -40,6 +41,7 @@ class Model:
     materials: list[Material]
     textures: list[Texture] = field(default_factory=list)
     camera: Camera | None = None
+    lights: list[PunctualLight] = field(default_factory=list)
 
 
 def face_normals(vertices: F64, faces: I64) -> F64:

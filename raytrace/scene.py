@@ -16,6 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raytrace.camera import Camera
+from raytrace.environment import Environment
+from raytrace.punctual import PunctualLight
 
 F64 = NDArray[np.float64]
 F32 = NDArray[np.float32]
@@ -99,9 +101,10 @@ class Mesh:
 
 @dataclass(frozen=True)
 class Scene:
-    """Meshes, materials, textures, a camera, optionally a constant sky and a camera flight.
+    """Meshes, materials, textures, a camera, optionally lights of other kinds and a camera flight.
 
     ``sky``: radiance of the constant sky, or None: then a ray that leaves the scene brings nothing.
+    ``environment``: light from all around instead of the constant sky; ``lights``: those without a surface.
     ``flight``: camera at a time in seconds, for demos and measurements; None: the still camera.
     ``notices``: what the loader repaired or approximated, one line each.
     """
@@ -114,6 +117,8 @@ class Scene:
     sky: tuple[float, float, float] | None = None
     flight: Callable[[float], Camera] | None = None
     notices: tuple[str, ...] = field(default=())
+    lights: tuple[PunctualLight, ...] = ()
+    environment: Environment | None = None
 
     @property
     def triangle_count(self) -> int:

@@ -41,6 +41,11 @@ class Tables(NamedTuple):
     light_pdf: Any
     light_density: Any
     sky: Any
+    punctual: Any
+    env_texels: Any
+    env_rows: Any
+    env_columns: Any
+    env_turn: Any
     far: Any
     """Length of a shadow ray to the sky: out of the scene from anywhere in it, in its own units."""
     prev_triangles: Any
@@ -53,9 +58,12 @@ class Variant(NamedTuple):
     textured: bool
     sky: bool
     moving: bool
-    lamps: bool = True
+    lamps: bool
     """Triangles that emit."""
-    specular: bool = False
+    punctual: bool
+    """Lights without a surface."""
+    environment: bool
+    specular: bool
     """Metals and gloss."""
 
 
@@ -80,6 +88,11 @@ def tables_of(scene: CompiledScene) -> Tables:
         lights.pdf,
         lights.density,
         lights.sky,
+        lights.punctual,
+        lights.environment.texels,
+        lights.environment.rows,
+        lights.environment.columns,
+        np.float32(lights.environment.turn),
         np.float32(max(1e8, 8.0 * scene.extent)),
         scene.prev_triangles,
         scene.static_count,
@@ -93,6 +106,8 @@ def variant_of(scene: CompiledScene) -> Variant:
         moving=scene.has_motion,
         lamps=len(scene.lights.triangles) > 0,
         specular=scene.has_specular,
+        punctual=len(scene.scene.lights) > 0,
+        environment=scene.scene.environment is not None,
     )
 
 

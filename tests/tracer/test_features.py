@@ -11,10 +11,12 @@ import pytest
 
 from bench.tracing import record
 from raytrace.compiled import compile_scene
+from raytrace.environment import Environment
 from raytrace.features import compiled_in, content_of, images_of, rays_of
 from raytrace.frame import FramePacket
 from raytrace.integrator import Settings, Tracer
 from raytrace.load import load_scene
+from raytrace.punctual import PunctualLight
 from raytrace.scene import Scene
 from raytrace.shot import Shot
 from raytrace.tables import Variant
@@ -32,6 +34,9 @@ SCENES = {
     "dark": DARK,
     "everything": everything(),
     "glossy": glossy(),
+    "a light and an environment": replace(
+        DARK, lights=(PunctualLight("spot", "spot"),), environment=Environment("grey", np.ones((4, 8, 3), np.float32))
+    ),
 }
 ALL_IMAGES = images_of(Variant(*(True for _ in Variant._fields)), positions=True)
 GLOSS = {"specular", "specular_albedo"}
@@ -87,14 +92,14 @@ def test_kernels_contain_what_the_scene_needs(trace: OpenTracer, what: Scene) ->
     assert guides == {
         "textured": variant.textured,
         "has_sky": variant.sky,
+        "environment": variant.environment,
         "moving": variant.moving,
         "positions": tracer.settings.positions,
         "specular": variant.specular,
     }
-    shading = {"textured": variant.textured, "has_sky": variant.sky, "lamps": variant.lamps}
-    if variant.specular:
-        shading["separable"] = False
-    assert first == second == shading
+    kinds = {name: getattr(variant, name) for name in ("textured", "lamps", "punctual", "environment")}
+    masking = {"separable": False} if variant.specular else {}
+    assert first == second == kinds | {"has_sky": variant.sky} | masking
 
 
 def test_everything_is_counted() -> None:
@@ -107,11 +112,18 @@ def test_everything_is_counted() -> None:
     assert content.texel_bytes == 3 * (14 * 9 + 7 * 4 + 3 * 2 + 1 + 4 * 4 + 2 * 2 + 1)
     assert (content.lamps, content.textured_lamps, content.double_sided_lamps) == (2, 2, 2)
     assert 0.0 < content.sky_share <= 0.5
+    assert (content.punctual, content.environment_size, content.environment_bytes) == ({}, None, 0)
     assert content.table_bytes > content.texel_bytes + tracer.scene.triangles.nbytes
 
     with Tracer(compile_scene(DARK), Settings(threads=1)) as tracer:
         content = content_of(tracer.scene, tracer.tables)
     assert (content.lamps, content.sky_share, content.textures, content.texel_bytes, content.moving) == (0, 0, 0, 0, 0)
+
+    with Tracer(compile_scene(SCENES["a light and an environment"]), Settings(threads=1)) as tracer:
+        content = content_of(tracer.scene, tracer.tables)
+    assert (content.punctual, content.environment_size) == ({"spot": 1}, (8, 4))
+    assert content.environment_bytes == 4 * (6 * 9 * 4 + 6 + 5 * 9)
+    assert 0.0 < content.sky_share <= 0.5
 
 
 def test_files_of_one_name_are_two_scenes(tmp_path: Path) -> None:

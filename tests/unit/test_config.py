@@ -236,6 +236,7 @@ def test_describe_has_every_parameter_once():
     assert [(row.section, row.key) for row in rows] == [
         (section.name, item.name)
         for section in dataclasses.fields(Config)
+        if section.name in SECTIONS
         for item in dataclasses.fields(getattr(Config(), section.name))
     ]
     assert ("svgf", "iterations", "int", "5", "[0;8]") in [row[:5] for row in rows]
