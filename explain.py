@@ -36,6 +36,7 @@ WORDS: Final = {
     "glossmap": "textures of roughness or metal",
     "bumps": "normal maps",
     "colored": "colours of vertices",
+    "cutout": "cut-outs",
     "separable": "separable masking",
     "punctual": "lights without a surface",
     "environment": "an environment",

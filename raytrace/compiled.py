@@ -78,6 +78,17 @@ class CompiledScene:
         """Whether any triangle is metallic or glossy."""
         return bool(self._used[:, SPECULAR].any())
 
+    @property
+    def has_cutout(self) -> bool:
+        """Whether any triangle may have a hole."""
+        materials = self.scene.materials
+        return any(materials[k].alpha_cutoff is not None for k in np.unique(self.triangle_info[:, MATERIAL]))
+
+    @property
+    def ordered_meshes(self) -> list[Mesh]:
+        """Meshes in the order of their triangles."""
+        return _ordered(self.scene)
+
     def has(self, column: int) -> bool:
         """Whether any triangle has the texture of that column of :attr:`material_info`."""
         return bool(self._used[:, column].max() >= 0)
@@ -155,11 +166,16 @@ def _colors(meshes: Sequence[Mesh]) -> F32:
     return np.ascontiguousarray(np.concatenate(parts), dtype=np.float32)
 
 
+def _ordered(scene: Scene) -> list[Mesh]:
+    """Meshes in the order of the triangles: those that move last."""
+    return sorted(scene.meshes, key=lambda mesh: mesh.motion is not None)
+
+
 def compile_scene(scene: Scene) -> CompiledScene:
     """Prepare ``scene`` for tracing. Raises UserError for a scene without triangles."""
     if scene.triangle_count == 0:
         raise UserError(f"{scene.name}: there is no triangle in this scene", "check that the file holds meshes")
-    meshes = [m for m in scene.meshes if m.motion is None] + [m for m in scene.meshes if m.motion is not None]
+    meshes = _ordered(scene)
     static_count = sum(len(m.faces) for m in meshes if m.motion is None)
     origin = scene.origin
     triangles = np.concatenate([_records(mesh, origin) for mesh in meshes])

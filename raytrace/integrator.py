@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from raytrace import kernels, kernels_glossy
 from raytrace.camera import Camera
 from raytrace.compiled import OBJECT, CompiledScene
+from raytrace.cutouts import CutoutCaster, cutouts_of
 from raytrace.embree import open_caster
 from raytrace.features import ILLUMINATION, images_of
 from raytrace.frame import FramePacket
@@ -153,6 +154,8 @@ class Tracer:
         self.images = images_of(self.variant, self.settings.positions)
         self.scene_id = next(_identities)
         self.rays = open_caster(scene.triangles, scene.static_count, self.settings.backend)
+        if (holes := cutouts_of(scene)) is not None:
+            self.rays = CutoutCaster(self.rays, holes)
         self.tables = tables_of(scene)
         self._guides = guide_kernel(self.variant, self.settings.positions)
         self._detailed = self.variant.specular or self.variant.bumps

@@ -73,6 +73,8 @@ class Variant(NamedTuple):
     """Normal maps."""
     colored: bool
     """Colours of vertices."""
+    cutout: bool
+    """Surfaces with holes."""
 
 
 def tables_of(scene: CompiledScene) -> Tables:
@@ -119,6 +121,7 @@ def variant_of(scene: CompiledScene) -> Variant:
         glossmap=scene.has(GLOSS_TEXTURE),
         bumps=scene.has(NORMAL_TEXTURE),
         colored=len(scene.colors) == len(scene.triangles),
+        cutout=scene.has_cutout,
         punctual=len(scene.scene.lights) > 0,
         environment=scene.scene.environment is not None,
     )
