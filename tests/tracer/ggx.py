@@ -6,6 +6,8 @@ vectors, distributed as the normals are (not as those that are seen), on a fine 
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -35,7 +37,8 @@ def masking(v: F64, light: F64, alpha: float, separable: bool = False) -> F64:
     return result
 
 
-def half_vectors(alpha: float, count: int = 400) -> tuple[F64, F64]:
+@cache
+def half_vectors(alpha: float, count: int = 240) -> tuple[F64, F64]:
     """Unit vectors (count², 3), and weights (count²,) for integrals of D(h) h_z times something over them."""
     nodes, weights = np.polynomial.legendre.leggauss(count)
     u, share = (nodes + 1) / 2, weights / 2
@@ -50,6 +53,7 @@ def view(cosine: float) -> F64:
     return np.array([np.sqrt(1 - cosine**2), 0.0, cosine])
 
 
+@cache
 def lobe_terms(cosine: float, alpha: float, separable: bool = False) -> tuple[float, float]:
     """Integrals over all light of D V cos, and of that times Schlick's weight (1 - v·h)^5."""
     v = view(cosine)
