@@ -74,4 +74,5 @@ def test_the_mean_of_many_frames_is_mitsubas(trace: OpenTracer, tmp_path: Path, 
     print(f"bias {float(ours.mean.mean() / theirs.mean.mean() - 1):+.2%}, standard error {float(relative.mean()):.2%}")
     assert relative.mean() < 0.04, "too noisy to tell anything"
     assert_same(ours, theirs, slack=2e-4)
-    assert_same(*(Estimate.of(one.mean(axis=(1, 2))) for one in images), sharp=0.04)
+    whole, peers_whole = (Estimate.of(one.mean(axis=(1, 2))) for one in images)
+    assert_same(whole, peers_whole, sharp=0.04)
