@@ -36,6 +36,9 @@ class Render(Section):
     )
     threads: int = param(0, 0, 256, "[0;256] threads that trace; 0: one for each core", live=False)
     tile: int = param(16384, 256, 1048576, "[256;1048576] pixels traced by one thread in one go", live=False)
+    regularize: bool = param(
+        True, doc="widen narrow specular lobes at a path's second hit; never in references", live=False
+    )
 
 
 @dataclass(frozen=True)
@@ -95,6 +98,7 @@ class Svgf(Section):
     sigma_n: int = param(128, 1, 1024, "[1;1024] exponent of the cosine between normals; more: sharper")
     sigma_l: float = param(4.0, 0.01, 1000, "[0.01;1000] tolerance for luminance, in standard deviations of the noise")
     first_sigma_l: float = param(4.0, 0.1, 1000, "[0.1;1000] sigma_l of the first iteration, in sigma_l of the others")
+    sigma_r: float = param(0.1, 0.001, 100, "[0.001;100] tolerance for roughness, of specular light only")
 
     @property
     def feedback(self) -> int:
@@ -114,6 +118,7 @@ class Bmfr(Section):
     preset: str = param(
         "best", choices=("paper", "reference", "best"), doc="values for the keys of this section that are not set"
     )
+    separate: bool = param(True, doc="fit diffuse and specular light apart", structural=True)
     demodulate: bool = param(True, doc="fit illumination, without the surfaces' albedo", structural=True)
     temporal: bool = param(True, doc="accumulate over time, samples and fits", structural=True, heading="accumulation")
     max_history: int = param(255, 10, 255, "[10;255] longest history counted, in frames")
@@ -161,8 +166,6 @@ class Bmfr(Section):
         names = self.features.split(",")
         if names[0] != "1":
             raise UserError(f'[bmfr] features: must begin with the constant, "1", not {names[0]!r}')
-        if "roughness" in names:
-            raise UserError("[bmfr] features: frames have no roughness yet, every surface is diffuse")
 
     @property
     def part_side(self) -> int:

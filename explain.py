@@ -32,6 +32,8 @@ WORDS: Final = {
     "has_sky": "a sky",
     "moving": "moving objects",
     "lamps": "lamps",
+    "specular": "metals and gloss",
+    "separable": "separable masking",
     "punctual": "lights without a surface",
     "environment": "an environment",
     "positions": "world positions",
@@ -43,7 +45,7 @@ _FEW: Final = 3
 
 _WIDTH: Final = 118
 _INDENT: Final = 40  # where the names of textures begin, or later
-_WORDS_INDENT: Final = 56  # where the words about rays and kernels begin, at most
+_WORDS_INDENT: Final = 60  # where the words about rays and kernels begin, at most
 
 
 @dataclass(frozen=True)
@@ -65,7 +67,8 @@ class Subject:
     def traits(self) -> FrameTraits:
         """Those that frames of the tracer will have."""
         pixel = self.scene.scene.camera.pixel_size(self.size[1])
-        return FrameTraits(moving="prev_normal" in self.tracer.images, pixel_size=pixel)
+        images = self.tracer.images
+        return FrameTraits(moving="prev_normal" in images, specular="specular" in images, pixel_size=pixel)
 
     @cached_property
     def plan(self) -> Plan:
@@ -187,7 +190,11 @@ def pass_section(subject: Subject) -> list[str]:
     """The passes that run, and those that could, each with the settings that decide on it."""
     plan = subject.plan
     programs = len({node.program for node in plan.passes})
-    rows = [(node.name, _because(subject, node.name)) for node in plan.passes]
+    longest = max(len(node.name) for node in plan.passes)
+    rows: list[tuple[str, ...]] = []
+    for node in plan.passes:
+        first, *more = textwrap.wrap(_because(subject, node.name), _WIDTH - longest - 4, break_on_hyphens=False)
+        rows += [(node.name, first), *(("", line) for line in more)]
     head = f"passes of {subject.denoiser}: {len(plan.passes)}, by {programs} programs, {len(plan.culled)} culled"
     lines = [head, *_columns(rows)]
     lines += [f"  {node.name}  culled: no output needs it" for node in plan.culled]
@@ -229,7 +236,7 @@ def memory_section(subject: Subject) -> list[str]:
 
 def switch_section(subject: Subject) -> list[str]:
     """What another value of each setting would change: passes, GPU memory, upload."""
-    rows: list[tuple[str, ...]] = [("", "passes", "compiled or wired anew", "GPU bytes", "bytes uploaded per frame")]
+    rows: list[tuple[str, ...]] = [("", "passes", "compiled or wired anew", "GPU bytes", "bytes uploaded")]
     before = subject.plan.memory(subject.size)
     for effect in nearest(subject.effects):
         after = effect.plan.memory(subject.size)

@@ -99,6 +99,7 @@ def prepare_tracer(
         threads=render.threads,
         tile=render.tile,
         positions=positions,
+        regularize=render.regularize,
     )
     return compiled, Tracer(compiled, settings)
 

@@ -16,17 +16,22 @@ from numba import config, njit
 Compiled = Callable[..., Any]
 
 SOURCES = (
+    "brdf",
     "casting",
     "compilation",
     "compiled",
+    "directional_albedo",
     "embree_native",
     "embree_run",
     "guides",
     "kernels",
+    "kernels_glossy",
     "lights",
     "punctual",
+    "reflectance",
     "rgbe",
     "sampling",
+    "surface",
     "tables",
     "textures",
 )

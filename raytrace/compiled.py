@@ -25,6 +25,9 @@ I32 = NDArray[np.int32]
 MATERIAL, OBJECT, LIGHT, SMOOTH = 0, 1, 2, 3
 """Columns of :attr:`CompiledScene.triangle_info`."""
 
+BASE_TEXTURE, EMISSION_TEXTURE, DOUBLE_SIDED, SPECULAR, GLOSS_TEXTURE, NORMAL_TEXTURE = 0, 1, 2, 3, 4, 5
+"""Columns of :attr:`CompiledScene.material_info`."""
+
 CORNERS, NORMALS, FACE_NORMAL, OFFSET, RECORD = 0, 9, 18, 21, 22
 """First columns of the parts of a triangle's record, and its length."""
 
@@ -39,8 +42,9 @@ class CompiledScene:
     ``triangle_info`` (T, 4) int32: material, object, light index or -1, 1 if the shading normals are the vertices'.
     ``triangle_uvs`` (T, 6) float32 and ``uv_density`` (T,) float32, uv units per scene unit (both of length 1 where
     nothing is textured).
-    ``base_color``, ``emission`` (M, 3) float32; ``material_info`` (M, 3) int32: base texture, emission texture, double
-    sided. ``prev_triangles`` (moving, RECORD) float32: the moving ones one frame ago.
+    ``base_color``, ``emission`` (M, 3) float32; ``material_info`` (M, 6) int32: base texture, emission texture, double
+    sided, specular, metallic-roughness texture, normal texture. ``gloss`` (M, 3) float32: metallic, roughness, scale of
+    the normal texture. ``prev_triangles`` (moving, RECORD) float32: the moving ones one frame ago.
     ``static_count``: number of triangles that never move. Arrays of moving triangles are rewritten for every frame: one
     tracer per compiled scene.
     """
@@ -54,6 +58,7 @@ class CompiledScene:
     base_color: F32
     emission: F32
     material_info: I32
+    gloss: F32
     textures: TextureAtlas
     lights: Lights
     static_count: int
@@ -63,6 +68,11 @@ class CompiledScene:
     @property
     def has_textures(self) -> bool:
         return bool(self.material_info[:, :2].max() >= 0)
+
+    @property
+    def has_specular(self) -> bool:
+        """Whether any triangle is metallic or glossy."""
+        return bool(self.material_info[np.unique(self.triangle_info[:, MATERIAL]), SPECULAR].any())
 
     @property
     def has_motion(self) -> bool:
@@ -144,7 +154,18 @@ def compile_scene(scene: Scene) -> CompiledScene:
 
     materials = scene.materials
     material_info = np.array(
-        [(m.base_texture, m.emission_texture if m.emits else -1, m.double_sided) for m in materials], dtype=np.int32
+        [
+            (
+                m.base_texture,
+                m.emission_texture if m.emits else -1,
+                m.double_sided,
+                m.specular,
+                m.metallic_roughness_texture if m.specular else -1,
+                m.normal_texture,
+            )
+            for m in materials
+        ],
+        dtype=np.int32,
     )
     uvs, density = np.zeros((1, 6), np.float32), np.zeros(1, np.float32)
     if material_info[:, :2].max() >= 0:
@@ -164,6 +185,7 @@ def compile_scene(scene: Scene) -> CompiledScene:
         base_color=np.array([m.base_color for m in materials], dtype=np.float32),
         emission=np.array([m.emission for m in materials], dtype=np.float32),
         material_info=material_info,
+        gloss=np.array([(m.metallic, m.roughness, m.normal_scale) for m in materials], dtype=np.float32),
         textures=build_atlas(scene.textures),
         lights=no_lights(),
         static_count=static_count,

@@ -15,7 +15,7 @@ from raytrace.guides import Outputs
 from raytrace.punctual import KINDS
 from raytrace.tables import Variant
 
-ILLUMINATION = ("direct", "indirect")
+ILLUMINATION = ("direct", "indirect", "specular")
 """The images of a frame with noise; all others come from the guide kernel."""
 
 
@@ -24,8 +24,14 @@ def images_of(variant: Variant, positions: bool) -> tuple[str, ...]:
 
     ``positions``: the surface points are asked for as well.
     """
-    needed = {"prev_normal": variant.moving, "position": positions, "prev_position": positions}
-    return (*ILLUMINATION, *(name for name in Outputs._fields if needed.get(name, True)))
+    needed = {
+        "prev_normal": variant.moving,
+        "position": positions,
+        "prev_position": positions,
+        "specular": variant.specular,
+        "specular_albedo": variant.specular,
+    }
+    return tuple(name for name in (*ILLUMINATION, *Outputs._fields) if needed.get(name, True))
 
 
 def rays_of(scene: CompiledScene) -> dict[str, int]:

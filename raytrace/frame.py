@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 F32 = NDArray[np.float32]
+Image = NDArray[np.floating]
 
 Vector = tuple[float, float, float]
 Basis = tuple[Vector, Vector, Vector]
@@ -27,11 +28,17 @@ class FramePacket:
 
     ``direct``, ``indirect`` (H, W, 4): rgb = illumination divided by the albedo ("demodulated"), linear; a unused (1).
     Direct holds the light sample of the first hit and light sources hit by the bounce ray, combined by multiple
-    importance sampling; indirect is what arrives over one bounce. 0 where the camera ray misses.
+    importance sampling; indirect is what arrives over one bounce. 0 where the camera ray misses. Both are what the
+    diffuse part of the surface reflects.
+    ``specular`` (H, W, 4): rgb = what its specular part reflects of both, divided by ``specular_albedo``; 0 where there
+    is none. None in a scene without metals and gloss, as is ``specular_albedo``.
 
     Without noise (guides):
 
-    ``albedo`` (H, W, 4): rgb in [0, 1], the divisor above; a = 1 on surfaces, 0 on misses.
+    ``albedo`` (H, W, 4): rgb in [0, 1], the divisor above; a = 1 on surfaces, 0 on misses. Of a glossy surface what
+    its diffuse part reflects from everywhere towards the camera, 0 for a metal.
+    ``specular_albedo`` (H, W, 4): rgb = what the specular part reflects from everywhere, in [0, 1], 0 on diffuse
+    surfaces; a = roughness in [0, 1], there 1. All 0 on a miss.
     ``emission`` (H, W, 4): rgb = radiance emitted by the surface seen, or of the sky on a miss; a unused (1).
     ``surface`` (H, W, 4): xyz = unit shading normal, world space, of the side that faces the camera; w = depth along
     the camera's forward axis, > 0, scene units. All 0 on a miss.
@@ -63,6 +70,8 @@ class FramePacket:
     prev_normal: F32 | None = None
     position: F32 | None = None
     prev_position: F32 | None = None
+    specular: F32 | None = None
+    specular_albedo: F32 | None = None
     scene: str = ""
     scene_id: int = 0
     cut: bool = False
@@ -77,5 +86,12 @@ class FramePacket:
         return self.direct.shape[1], self.direct.shape[0]
 
     def radiance(self) -> F32:
-        """The noisy picture: (direct + indirect) x albedo + emission, (H, W, 3) linear radiance."""
-        return (self.direct[..., :3] + self.indirect[..., :3]) * self.albedo[..., :3] + self.emission[..., :3]
+        """The noisy picture, (H, W, 3) linear radiance."""
+        return self.modulated(self.direct, self.indirect, self.specular)
+
+    def modulated(self, direct: Image, indirect: Image, specular: Image | None = None) -> Image:
+        """(direct + indirect) x albedo + specular x specular albedo + emission, (H, W, 3) linear radiance."""
+        diffuse = (direct[..., :3] + indirect[..., :3]) * self.albedo[..., :3]
+        if specular is not None and self.specular_albedo is not None:
+            diffuse = diffuse + specular[..., :3] * self.specular_albedo[..., :3]
+        return diffuse + self.emission[..., :3]

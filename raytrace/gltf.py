@@ -136,14 +136,11 @@ def _name_the_rest(file: GltfFile, nodes: list[Node], notices: Notices) -> None:
     primitives = [
         p for m in meshes for p in file.tables(file.entry("meshes", m, "a node"), "primitives", f"meshes[{m}]")
     ]
-    colored = sum("COLOR_0" in file.table(p, "attributes", "a primitive") for p in primitives)
     morphing = sum("targets" in p for p in primitives)
     if instanced:
         notices.add(f"{counted(instanced, 'node')} with EXT_mesh_gpu_instancing: drawn once only")
     if skinned or morphing:
         notices.add(f"{counted(skinned + morphing, 'skinned or morphing object')}: drawn in the rest pose")
-    if colored:
-        notices.add(f"{counted(colored, 'primitive')} with vertex colours: drawn without them")
     unknown = [
         name
         for name in file.names("extensionsUsed")

@@ -12,13 +12,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from raytrace.compilation import device, kernel
-from raytrace.compiled import FACE_NORMAL, MATERIAL, OBJECT, SMOOTH
+from raytrace.compilation import device, inlined, kernel
+from raytrace.compiled import FACE_NORMAL, MATERIAL, OBJECT, SMOOTH, SPECULAR
 from raytrace.lights import environment_at
+from raytrace.reflectance import albedos
+from raytrace.surface import footprint_of, seen_from, surface_gloss
 from raytrace.tables import Variant, interpolate, shading_normal, surface_color
 
 _ZERO, _ONE, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
-_MIN_COSINE = np.float32(0.05)  # grazing limit of the depth gradient and of texture footprints
+MIN_COSINE = np.float32(0.05)  # grazing limit of the depth gradient and of texture footprints
 
 
 @kernel
@@ -69,13 +71,34 @@ class Outputs(NamedTuple):
     prev_normal: Any
     position: Any
     prev_position: Any
+    specular_albedo: Any
+
+
+@inlined
+def _write_albedos(textured, tables, out, p, t, material, u, v, pixel, ex, ey, ez, gx, gy, gz, nx, ny, nz):  # type: ignore[no-untyped-def]
+    """Both albedos and the roughness of a point in a scene with specular surfaces, seen from (ex, ey, ez) beside it.
+
+    By the same arithmetic as the sample that is divided by them; a diffuse surface has roughness 1 and no specular.
+    """
+    distance, cosine, facing = seen_from(ex, ey, ez, gx, gy, gz, nx, ny, nz)
+    footprint = footprint_of(pixel, distance, facing)
+    r, g, b, metallic, roughness = surface_gloss(textured, tables, t, material, u, v, footprint)
+    sr, sg, sb = _ZERO, _ZERO, _ZERO
+    if tables.material_info[material, SPECULAR] != 0:
+        r, g, b, sr, sg, sb = albedos(tables.reflectance, r, g, b, metallic, roughness, cosine)
+    else:
+        roughness = _ONE
+    out.albedo[p, 0], out.albedo[p, 1], out.albedo[p, 2], out.albedo[p, 3] = r, g, b, _ONE
+    out.specular_albedo[p, 0], out.specular_albedo[p, 1], out.specular_albedo[p, 2] = sr, sg, sb
+    out.specular_albedo[p, 3] = roughness
 
 
 @cache
 def guide_kernel(variant: Variant, positions: bool) -> Callable[..., Any]:
     """Kernel that writes the noise-free guides of a tile; ``positions``: world positions as well."""
     textured = variant.textured
-    has_sky, environment, moving = variant.sky, variant.environment, variant.moving
+    has_sky, environment = variant.sky, variant.environment
+    moving, specular = variant.moving, variant.specular
 
     @kernel
     def guides(  # type: ignore[no-untyped-def]
@@ -95,6 +118,8 @@ def guide_kernel(variant: Variant, positions: bool) -> Callable[..., Any]:
                     out.emission[p, k] = _ZERO
                     if moving:
                         out.prev_normal[p, k] = _ZERO
+                    if specular:
+                        out.specular_albedo[p, k] = _ZERO
                     if positions:
                         out.position[p, k] = _ZERO
                         out.prev_position[p, k] = _ZERO
@@ -130,7 +155,7 @@ def guide_kernel(variant: Variant, positions: bool) -> Callable[..., Any]:
             # -depth (n·∂d)/(n·d). Near grazing n·d -> 0 is held at the cosine limit, so that a wall seen edge-on does
             # not accept every depth.
             length = math.sqrt(dx * dx + dy * dy + dz * dz)
-            facing = min(gx * dx + gy * dy + gz * dz, -_MIN_COSINE * length)
+            facing = min(gx * dx + gy * dy + gz * dz, -MIN_COSINE * length)
             scale = -depth / facing
             out.gradient[p, 0] = scale * sx * (gx * right[0] + gy * right[1] + gz * right[2])
             out.gradient[p, 1] = scale * sy * (gx * up[0] + gy * up[1] + gz * up[2])
@@ -141,11 +166,17 @@ def guide_kernel(variant: Variant, positions: bool) -> Callable[..., Any]:
 
             material = tables.info[t, MATERIAL]
             footprint = pixel * depth * math.sqrt(-length / facing)
-            r, g, b = surface_color(textured, tables, 0, tables.base_color, t, material, u[i], v[i], footprint)
-            out.albedo[p, 0] = r
-            out.albedo[p, 1] = g
-            out.albedo[p, 2] = b
-            out.albedo[p, 3] = _ONE
+            if specular:
+                ex, ey, ez = eye[0] - x, eye[1] - y, eye[2] - z
+                _write_albedos(
+                    textured, tables, out, p, t, material, u[i], v[i], pixel, ex, ey, ez, gx, gy, gz, nx, ny, nz
+                )
+            else:
+                r, g, b = surface_color(textured, tables, 0, tables.base_color, t, material, u[i], v[i], footprint)
+                out.albedo[p, 0] = r
+                out.albedo[p, 1] = g
+                out.albedo[p, 2] = b
+                out.albedo[p, 3] = _ONE
             if front or tables.material_info[material, 2] != 0:
                 r, g, b = surface_color(textured, tables, 1, tables.emission, t, material, u[i], v[i], footprint)
             else:

@@ -19,11 +19,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from raytrace import kernels
+from raytrace import kernels, kernels_glossy
 from raytrace.camera import Camera
 from raytrace.compiled import OBJECT, CompiledScene
 from raytrace.embree import open_caster
-from raytrace.features import images_of
+from raytrace.features import ILLUMINATION, images_of
 from raytrace.frame import FramePacket
 from raytrace.guides import Outputs, camera_rays, guide_kernel
 from raytrace.lights import SHADOW_END
@@ -74,6 +74,11 @@ class View:
     matrix: F32
     jitter: F32
 
+    @property
+    def pixel(self) -> float:
+        """Width of a pixel at depth 1: ``up`` spans half the image."""
+        return float(np.linalg.norm(self.up)) * 2.0 / self.size[1]
+
     @staticmethod
     def of(camera: Camera, size: tuple[int, int], origin: F64) -> View:
         aspect = size[0] / size[1]
@@ -94,7 +99,7 @@ class _Scratch(threading.local):
     """Buffers of one thread for tiles of up to ``capacity`` paths, made on first use."""
 
     def __init__(self) -> None:
-        self.capacity = 0
+        self.capacity = self.glossy_capacity = 0
 
     def reserve(self, count: int) -> None:
         if count <= self.capacity:
@@ -105,12 +110,23 @@ class _Scratch(threading.local):
         self.light = np.empty((count, 3), np.float32)
         self.index, self.bounce_index = np.empty((2, count), np.int32)
         self.bounce_pdf, self.limit = np.empty((2, count), np.float32)
+        self.glossy_capacity = 0
+
+    def reserve_glossy(self, count: int) -> None:
+        """What paths over glossy surfaces need besides."""
+        if count <= self.glossy_capacity:
+            return
+        self.glossy_capacity = count
+        self.gloss = np.empty((count, 3), np.float32)
+        self.bounce_cosine, self.bounce_weight = np.empty(count, np.float32), np.empty((count, 4), np.float32)
 
 
 @dataclass
 class Settings:
     """How frames are traced. ``generator``: HALTON or HASH; ``threads`` 0 = one per core; ``tile`` pixels per tile;
-    ``positions``: frames carry world positions; ``backend``: see :func:`raytrace.embree.open_caster`."""
+    ``positions``: frames carry world positions; ``backend``: see :func:`raytrace.embree.open_caster`; ``regularize``:
+    narrow lobes are widened at a path's second hit, never in references; ``separable``: Smith's masking in its older,
+    separable form, as some renderers have it."""
 
     seed: int = 0
     generator: int = HALTON
@@ -118,6 +134,8 @@ class Settings:
     tile: int = 16384
     positions: bool = False
     backend: str = "auto"
+    regularize: bool = True
+    separable: bool = False
 
 
 class Tracer:
@@ -135,8 +153,12 @@ class Tracer:
         self.rays = open_caster(scene.triangles, scene.static_count, self.settings.backend)
         self.tables = tables_of(scene)
         self._guides = guide_kernel(self.variant, self.settings.positions)
-        self._first_hit = kernels.first_hit_kernel(self.variant)
-        self._second_hit = kernels.second_hit_kernel(self.variant)
+        if self.variant.specular:
+            self._first_hit = kernels_glossy.first_hit_kernel(self.variant, self.settings.separable)
+            self._second_hit = kernels_glossy.second_hit_kernel(self.variant, self.settings.separable)
+        else:
+            self._first_hit = kernels.first_hit_kernel(self.variant)
+            self._second_hit = kernels.second_hit_kernel(self.variant)
         self._scratch = _Scratch()
         self.threads = self.settings.threads or len(os.sched_getaffinity(0))
         self._pool = ThreadPoolExecutor(self.threads, "trace") if self.threads > 1 else None
@@ -194,13 +216,30 @@ class Tracer:
         objects = np.where(triangle >= 0, self.scene.triangle_info[triangle, OBJECT], np.int32(-1))
         return Hits(triangle, u, v, objects), directions
 
-    def shade(self, hits: Hits, seeds: Seeds, eye: F32, direct: F32, indirect: F32) -> None:
+    def shade(
+        self,
+        hits: Hits,
+        seeds: Seeds,
+        eye: F32,
+        direct: F32,
+        indirect: F32,
+        specular: F32 | None = None,
+        *,
+        pixel: float = 0.0,
+    ) -> None:
         """One path from each of ``hits``, with the random numbers of ``seeds``, at the time last set.
 
         Writes ``direct`` and ``indirect`` (n, >= 3) float32: radiance towards ``eye`` (3,) float32 divided by the
         albedo; 0 where there is no hit. Depends on nothing but the surface point, the seeds, the time and the side of
         the surface that ``eye`` is on.
+
+        In a scene with specular surfaces also ``specular``, divided by theirs; there it depends on ``eye`` itself, and
+        on ``pixel``, the width of a pixel at distance 1, by which textures are filtered.
         """
+        if self.variant.specular:
+            assert specular is not None
+            self._shade_glossy(hits, seeds, eye, direct, indirect, specular, pixel)
+            return
         count = len(hits.triangle)
         s = self._scratch
         s.reserve(count)
@@ -223,13 +262,41 @@ class Tracer:
         )  # fmt: skip
         self._trace_shadows(shadows, indirect)
 
-    def _trace_shadows(self, count: int, out: F32) -> None:
+    def _shade_glossy(
+        self, hits: Hits, seeds: Seeds, eye: F32, direct: F32, indirect: F32, specular: F32, pixel: float
+    ) -> None:
+        count = len(hits.triangle)
+        s, settings = self._scratch, self.settings
+        s.reserve(count)
+        s.reserve_glossy(count)
+        for image in (direct, indirect, specular):
+            image[:, :3] = 0.0
+        shadows, bounces = self._first_hit(
+            self.tables, hits.triangle, hits.u, hits.v, eye, np.float32(pixel), seeds.pixel, seeds.frame,
+            settings.seed, settings.generator, s.shadow_o, s.shadow_d, s.index, s.light, s.gloss, s.bounce_o,
+            s.bounce_d, s.bounce_index, s.bounce_pdf, s.bounce_cosine, s.bounce_weight,
+        )  # fmt: skip
+        self._trace_shadows(shadows, direct, specular)
+        if bounces == 0:
+            return
+        bounce_o, bounce_d = s.bounce_o[:bounces], s.bounce_d[:bounces]
+        triangle, u, v = self.rays.intersect(bounce_o, bounce_d)
+        shadows = self._second_hit(
+            self.tables, triangle, u, v, bounce_o, bounce_d, s.bounce_index, s.bounce_pdf, s.bounce_cosine,
+            s.bounce_weight, seeds.pixel, seeds.frame, settings.seed, settings.generator, settings.regularize, direct,
+            specular, s.shadow_o, s.shadow_d, s.index, s.light, s.gloss,
+        )  # fmt: skip
+        self._trace_shadows(shadows, indirect, specular)
+
+    def _trace_shadows(self, count: int, out: F32, gloss: F32 | None = None) -> None:
         if count == 0:
             return
         s = self._scratch
         kernels.fill(s.limit, count, SHADOW_END)
         blocked = self.rays.occluded(s.shadow_o[:count], s.shadow_d[:count], s.limit[:count])
         kernels.add_unoccluded(blocked, s.index, s.light, out)
+        if gloss is not None:
+            kernels.add_unoccluded(blocked, s.index, s.gloss, gloss)
 
     def frame(
         self,
@@ -250,8 +317,8 @@ class Tracer:
         self.set_time(now, previous)
         view, before = self._views(camera, previous_camera, size)
         count = size[0] * size[1]
-        direct, indirect = np.empty((2, count, 4), np.float32)
-        direct[:, 3] = indirect[:, 3] = 1.0
+        signals = np.empty((3 if self.variant.specular else 2, count, 4), np.float32)
+        signals[..., 3] = 1.0
         outputs = self._outputs(count)
 
         def tile(pixels: I32) -> None:
@@ -259,11 +326,11 @@ class Tracer:
             self._write_guides(view, before, pixels, hits, directions, outputs)
             seeds = Seeds(pixels.astype(np.uint32), np.full(len(pixels), index, np.uint32))
             part = slice(int(pixels[0]), int(pixels[-1]) + 1)
-            self.shade(hits, seeds, view.eye, direct[part], indirect[part])
+            self.shade(hits, seeds, view.eye, *signals[:, part], pixel=view.pixel)
 
         embree = self.for_each_tile(tile, size)
         timings = {"trace": time.perf_counter() - start, "embree": embree}
-        return self._packet(index, now, size, direct, indirect, outputs, cut, camera, timings)
+        return self._packet(index, now, size, signals, outputs, cut, camera, timings)
 
     def reference(
         self,
@@ -273,8 +340,9 @@ class Tracer:
         now: float = 0.0,
         first_sample: int = 0,
         progress: Callable[[float], None] | None = None,
-    ) -> tuple[F64, F64]:
-        """Plain means of ``samples`` independent paths per pixel: direct and indirect, (H, W, 3) float64, demodulated.
+    ) -> tuple[F64, ...]:
+        """Plain means of ``samples`` independent paths per pixel: direct, indirect and, in a scene with specular
+        surfaces, specular, (H, W, 3) float64 each, demodulated.
 
         Uncycled hash numbers under a seed of their own; no clamp, no regularisation. Means over disjoint
         ranges of ``first_sample`` may be averaged.
@@ -282,21 +350,22 @@ class Tracer:
         self.set_time(now, now)
         view, _ = self._views(camera, camera, size)
         count = size[0] * size[1]
-        sums = np.zeros((2, count, 3))
+        signals = 3 if self.variant.specular else 2
+        sums = np.zeros((signals, count, 3))
         normal = self.settings
-        self.settings = replace(normal, seed=(normal.seed + REFERENCE_SEED) & 0xFFFFFFFF, generator=HASH)
+        seed = (normal.seed + REFERENCE_SEED) & 0xFFFFFFFF
+        self.settings = replace(normal, seed=seed, generator=HASH, regularize=False)
         done = [0]
 
         def tile(pixels: I32) -> None:
             hits, _ = self._camera_hits(view, pixels, whole_rows=True)
             part = slice(int(pixels[0]), int(pixels[-1]) + 1)
-            direct, indirect = np.empty((2, len(pixels), 3), np.float32)
+            sample_of = np.empty((signals, len(pixels), 3), np.float32)
             seeds = Seeds(pixels.astype(np.uint32), np.empty(len(pixels), np.uint32))
             for sample in range(first_sample, first_sample + samples):
                 seeds.frame[:] = 0x80000000 + sample
-                self.shade(hits, seeds, view.eye, direct, indirect)
-                sums[0, part] += direct
-                sums[1, part] += indirect
+                self.shade(hits, seeds, view.eye, *sample_of, pixel=view.pixel)
+                sums[:, part] += sample_of
             done[0] += len(pixels)
             if progress is not None:
                 progress(done[0] / count)
@@ -305,8 +374,7 @@ class Tracer:
             self.for_each_tile(tile, size)
         finally:
             self.settings = normal
-        means = (sums / samples).reshape(2, size[1], size[0], 3)
-        return means[0], means[1]
+        return tuple((sums / samples).reshape(signals, size[1], size[0], 3))
 
     def for_each_tile(self, work: Callable[[I32], None], size: tuple[int, int]) -> float:
         """Run ``work`` on tiles of consecutive pixels; returns seconds inside Embree, averaged over the threads.
@@ -348,6 +416,7 @@ class Tracer:
             prev_normal=optional("prev_normal"),
             position=optional("position"),
             prev_position=optional("prev_position"),
+            specular_albedo=optional("specular_albedo"),
         )
 
     def _write_guides(
@@ -363,8 +432,7 @@ class Tracer:
         index: int,
         now: float,
         size: tuple[int, int],
-        direct: F32,
-        indirect: F32,
+        signals: F32,
         out: Outputs,
         cut: bool,
         camera: Camera,
@@ -379,8 +447,7 @@ class Tracer:
         return FramePacket(
             index=index,
             time=now,
-            direct=image(direct),
-            indirect=image(indirect),
+            **{name: image(values) for name, values in zip(ILLUMINATION, signals, strict=False)},
             **guides,
             scene=self.scene.scene.name,
             scene_id=self.scene_id,

@@ -35,7 +35,7 @@ from raytrace.tables import Variant, interpolate, shading_normal, surface_color
 
 _ZERO, _ONE = np.float32(0.0), np.float32(1.0)
 _PI, _INV_PI = np.float32(math.pi), np.float32(1.0 / math.pi)
-_BOUNCE_CONE = np.float32(0.1)  # footprint of a bounce ray's hit per unit of distance: it stands for a wide lobe
+BOUNCE_CONE = np.float32(0.1)  # footprint of a bounce ray's hit per unit of distance: it stands for a wide lobe
 
 
 @cache
@@ -156,7 +156,7 @@ def second_hit_kernel(variant: Variant) -> Callable[..., Any]:
                 continue
             scale = (wx * nx + wy * ny + wz * nz) * _INV_PI / abs(density)
             r, g, bl = r * scale, g * scale, bl * scale
-            footprint = _BOUNCE_CONE * math.sqrt(square)
+            footprint = BOUNCE_CONE * math.sqrt(square)
             ar, ag, ab = surface_color(textured, tables, 0, tables.base_color, t, material, u[k], v[k], footprint)
             r, g, bl = r * ar, g * ag, bl * ab
             if r + g + bl > _ZERO:

@@ -31,21 +31,32 @@ Motion = Callable[[float], F64]
 class Texture:
     """An image read by texture coordinates, repeated in both directions.
 
-    ``pixels``: (h, w, 3) uint8, row 0 = bottom row, sRGB-encoded (glTF 2.0, sec. 3.9.2: base colour and emissive
-    textures are).
+    ``pixels``: (h, w, 3) uint8, row 0 = bottom row, sRGB-encoded as base colour and emissive textures are, or with
+    ``linear`` plain fractions of 255 as all others (glTF 2.0, sec. 3.9). ``alpha``: (h, w) uint8 coverage, or None.
     """
 
     name: str
     pixels: NDArray[np.uint8]
+    linear: bool = False
+    alpha: NDArray[np.uint8] | None = None
 
 
 @dataclass(frozen=True)
 class Material:
-    """A diffuse (Lambertian) surface that may emit.
+    """A surface that may emit: diffuse (Lambertian), or with ``specular`` glTF's metallic-roughness model.
 
-    ``base_color``: linear reflectance in [0, 1], multiplied by ``base_texture`` where there is one.
+    ``base_color``: linear, in [0, 1], multiplied by ``base_texture`` and the mesh's colours where there are any: the
+    reflectance of what is diffuse, and that of a metal seen head-on.
     ``emission``: radiance of the front face (of both faces where ``double_sided``), W/(m² sr) in the scene's own scale,
     multiplied by ``emission_texture`` where there is one. Textures are indices into :attr:`Scene.textures`, -1 = none.
+
+    ``specular``: whether there is a specular lobe at all; without, ``metallic`` and ``roughness`` mean nothing.
+    ``metallic``, ``roughness``: in [0, 1], multiplied by blue and green of the linear ``metallic_roughness_texture``;
+    GGX's width is the roughness squared. ``normal_texture``: a linear texture of normals in tangent space, whose x
+    and y are multiplied by ``normal_scale``.
+
+    ``alpha``: coverage in [0, 1], multiplied by those of the base texture and the mesh's colours. The surface is not
+    there where the product is below ``alpha_cutoff``; None: it is everywhere, whatever the product.
     """
 
     name: str
@@ -54,6 +65,14 @@ class Material:
     emission: tuple[float, float, float] = (0.0, 0.0, 0.0)
     emission_texture: int = -1
     double_sided: bool = False
+    specular: bool = False
+    metallic: float = 0.0
+    roughness: float = 1.0
+    metallic_roughness_texture: int = -1
+    normal_texture: int = -1
+    normal_scale: float = 1.0
+    alpha: float = 1.0
+    alpha_cutoff: float | None = None
 
     @property
     def emits(self) -> bool:
@@ -67,6 +86,7 @@ class Mesh:
     ``vertices`` (V, 3) float64: world space, or object space where ``motion`` is given. ``faces`` (F, 3) int32.
     ``normals`` (V, 3) float32, unit length, or None for flat shading. ``uvs`` (V, 2) float32 or None.
     ``materials`` (F,) int32: index into :attr:`Scene.materials` per triangle.
+    ``colors`` (V, 4) float32: linear factors of base colour and alpha, in [0, 1], or None.
     """
 
     name: str
@@ -76,6 +96,7 @@ class Mesh:
     normals: F32 | None = None
     uvs: F32 | None = None
     motion: Motion | None = None
+    colors: F32 | None = None
 
 
 @dataclass(frozen=True)

@@ -71,13 +71,16 @@ class Shot:
 
     def reference(
         self, index: int, samples: int, progress: Callable[[float], None] | None = None
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Converged direct and indirect illumination of frame ``index``, (H, W, 3) float64 each, demodulated."""
+    ) -> tuple[NDArray[np.float64], ...]:
+        """Converged illumination of frame ``index``: what :meth:`raytrace.integrator.Tracer.reference` gives."""
         return self.tracer.reference(self.camera(index), self.size, samples, self.time(index), progress=progress)
 
 
-def modulate(packet: FramePacket, direct: NDArray[np.float64], indirect: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Full radiance of demodulated illumination in the frame of ``packet``, (H, W, 4) float32."""
-    radiance = np.ones((*direct.shape[:2], 4), np.float32)
-    radiance[..., :3] = (direct + indirect) * packet.albedo[..., :3] + packet.emission[..., :3]
+def modulate(packet: FramePacket, *signals: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Full radiance of demodulated illumination in the frame of ``packet``, (H, W, 4) float32.
+
+    ``signals``: direct, indirect and, where the frame has it, specular.
+    """
+    radiance = np.ones((*signals[0].shape[:2], 4), np.float32)
+    radiance[..., :3] = packet.modulated(*signals)
     return radiance

@@ -13,6 +13,7 @@ import numpy as np
 
 from raytrace.compilation import device, inlined
 from raytrace.compiled import FACE_NORMAL, NORMALS, CompiledScene
+from raytrace.directional_albedo import table
 from raytrace.textures import SRGB_TO_LINEAR, level_for, lookup
 
 _ZERO, _ONE = np.float32(0.0), np.float32(1.0)
@@ -28,6 +29,9 @@ class Tables(NamedTuple):
     base_color: Any
     emission: Any
     material_info: Any
+    gloss: Any
+    reflectance: Any
+    """Table of :mod:`raytrace.directional_albedo`, or one of a single entry where nothing is specular."""
     texels: Any
     levels: Any
     decode: Any
@@ -59,6 +63,8 @@ class Variant(NamedTuple):
     punctual: bool
     """Lights without a surface."""
     environment: bool
+    specular: bool
+    """Metals and gloss."""
 
 
 def tables_of(scene: CompiledScene) -> Tables:
@@ -71,6 +77,8 @@ def tables_of(scene: CompiledScene) -> Tables:
         scene.base_color,
         scene.emission,
         scene.material_info,
+        scene.gloss,
+        table() if scene.has_specular else np.zeros((1, 1, 3), np.float32),
         scene.textures.texels,
         scene.textures.levels,
         SRGB_TO_LINEAR,
@@ -97,6 +105,7 @@ def variant_of(scene: CompiledScene) -> Variant:
         sky=scene.lights.has_sky,
         moving=scene.has_motion,
         lamps=len(scene.lights.triangles) > 0,
+        specular=scene.has_specular,
         punctual=len(scene.scene.lights) > 0,
         environment=scene.scene.environment is not None,
     )

@@ -30,7 +30,7 @@ from raytrace.frame import Basis, Vector
 REPROJECTION = "xy: position in the last frame, texel units; z: mask of the 2x2 valid taps; w: history length N, frames"
 SAMPLES = "rgb: accumulated irradiance, finite; a: frames in it, 0 where there is none"
 
-COMPONENTS: Final = {"1": 1, "n": 3, "w": 3, "w2": 3, "w3": 3, "albedo": 3, "depth": 1}
+COMPONENTS: Final = {"1": 1, "n": 3, "w": 3, "w2": 3, "w3": 3, "albedo": 3, "roughness": 1, "depth": 1}
 """Numbers that each feature contributes to a row."""
 
 OFFSETS: Final = (
@@ -153,6 +153,12 @@ class Fit(ComputePass):
         return x + 1, y + 1
 
 
+class FitRough(Fit):
+    """The same with roughness among the features."""
+
+    in_roughness = In("a: the surface's roughness")
+
+
 class AccumulateFit(FragmentPass):
     """Blend the fit with those before, by the decisions of :class:`Accumulate` (postprocessing)."""
 
@@ -165,8 +171,11 @@ class AccumulateFit(FragmentPass):
 
 
 def layout(features: str) -> dict[str, int]:
-    """``FEATURES``, the length of a row, and for each feature ``X_AT``, its place there; -1 for what is not listed."""
-    places = {f"{name.upper()}_AT": -1 for name in COMPONENTS if name != "1"}
+    """``FEATURES``, the length of a row, and for each feature ``X_AT``, its place there; -1 for what is not listed.
+
+    There is no ``ROUGHNESS_AT`` without that feature, which few scenes have.
+    """
+    places = {f"{name.upper()}_AT": -1 for name in COMPONENTS if name not in ("1", "roughness")}
     length = 0
     for name in features.split(","):
         if name != "1":
@@ -196,15 +205,20 @@ def shared_bytes(features: int, threads: int, parts: int = 0) -> int:
     return 4 * triangle * slots + 2 * 16 * threads + 16 * features * (1 + parts)
 
 
-def bmfr(g: Graph, signals: dict[str, Tex], albedo: Tex, guides: Guides, p: Bmfr, view: View) -> Tex:
+def bmfr(
+    g: Graph, signals: dict[str, Tex], features: dict[str, Tex], guides: Guides, p: Bmfr, view: View, name: str = "bmfr"
+) -> Tex:
     """Filter the sum of ``signals`` (noisy irradiance by name: "direct" and, if it is apart, "indirect"); returns the
-    clean one. Histories are named by whether the signals hold the albedo."""
+    clean one. Histories are named by ``name`` and by whether the signals hold the albedo.
+
+    ``features``: textures of features that are no guides, "albedo" and where there is one "roughness".
+    """
     inputs = {f"in_{name}": noisy for name, noisy in signals.items()}
-    names = "bmfr" if p.demodulate else "bmfr.radiance"
-    with g.scope("bmfr"):
+    names = name if p.demodulate else f"{name}.radiance"
+    with g.scope(name):
         if not p.temporal:
             samples = g.add(Samples(), in_surface=guides.surface, **inputs).out_color
-            return _fit(g, samples, albedo, guides, p, view) if p.fit else samples
+            return _fit(g, samples, features, guides, p, view) if p.fit else samples
         noisy, guide = g.history(f"{names}.noisy", "rgba16f"), g.history(f"{names}.guide", "rg32f")
         accumulated = g.add(
             Accumulate(
@@ -230,7 +244,7 @@ def bmfr(g: Graph, signals: dict[str, Tex], albedo: Tex, guides: Guides, p: Bmfr
         fitted = g.history(f"{names}.fitted", "rgba16f")
         clean = g.add(
             AccumulateFit(u_alpha=p.alpha_fit),
-            in_color=_fit(g, accumulated.out_color, albedo, guides, p, view),
+            in_color=_fit(g, accumulated.out_color, features, guides, p, view),
             in_reprojection=accumulated.out_reprojection,
             prev_color=fitted,
         ).out_color
@@ -238,6 +252,7 @@ def bmfr(g: Graph, signals: dict[str, Tex], albedo: Tex, guides: Guides, p: Bmfr
         return clean
 
 
-def _fit(g: Graph, samples: Tex, albedo: Tex, guides: Guides, p: Bmfr, view: View) -> Tex:
-    features = {"in_albedo": albedo} if "albedo" in p.features.split(",") else {}
-    return g.add(Fit(p, view), in_color=samples, in_surface=guides.surface, **features).out_color
+def _fit(g: Graph, samples: Tex, features: dict[str, Tex], guides: Guides, p: Bmfr, view: View) -> Tex:
+    used = {f"in_{name}": texture for name, texture in features.items() if name in p.features.split(",")}
+    work = FitRough(p, view) if "in_roughness" in used else Fit(p, view)
+    return g.add(work, "fit", in_color=samples, in_surface=guides.surface, **used).out_color

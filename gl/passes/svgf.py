@@ -33,9 +33,14 @@ and 1 % more in the Cornell box, where hardly anything is disoccluded. The other
 
 from __future__ import annotations
 
+from typing import Any
+
 from config import Svgf
 from gl.graph import FragmentPass, Graph, In, Out, Tex, Uniform
+from gl.passes.display import GLOSSY
 from gl.passes.temporal import REPROJECTION, Guides, accumulate, reproject
+
+GLOSS = "of specular light: rgb: its albedo, 0: there is none; a: roughness"
 
 
 class Variance(FragmentPass):
@@ -67,26 +72,54 @@ class Atrous(FragmentPass):
     u_sigma_l = Uniform("float", "> 0, luminance edge-stopping in standard deviations")
     u_pixel_size = Uniform("float", "> 0, scene units a pixel is wide at depth 1")
 
-    def __init__(self, p: Svgf, step: int, pixel_size: float, raw: bool = False) -> None:
+    def __init__(self, p: Svgf, step: int, pixel_size: float, raw: bool = False, glossy: bool = False) -> None:
         # A power of two is squared into place: pow() costs more than seven products.
         squarings = p.sigma_n.bit_length() - 1
+        gloss: dict[str, Any] = {"u_sigma_r": p.sigma_r} if glossy else {}
         super().__init__(
             defines={
                 "STEP": step,
                 "SIGMA_N_SQUARINGS": squarings if p.sigma_n == 1 << squarings else -1,
                 "LUMINANCE_STOP": int(p.variance_guided),
                 "RAW": int(raw),
+                **(GLOSSY if glossy else {}),
             },
             u_accumulated_variance=p.alpha / (2.0 - p.alpha),
             u_sigma_z=p.sigma_z,
             u_sigma_n=float(p.sigma_n),
             u_sigma_l=p.sigma_l * (p.first_sigma_l if step == 1 else 1.0),
             u_pixel_size=pixel_size,
+            **gloss,
         )
 
 
-def svgf(g: Graph, signals: dict[str, Tex], guides: Guides, p: Svgf, pixel_size: float) -> dict[str, Tex]:
-    """Filter each of ``signals`` (noisy irradiance by name, "direct", "indirect" or "both"); returns the clean ones.
+class GlossyVariance(Variance):
+    """The same for specular light, in which only surfaces of the same roughness have a part."""
+
+    in_specular_albedo = In(GLOSS)
+    u_sigma_r = Uniform("float", "> 0, roughness edge-stopping")
+
+
+class GlossyAtrous(Atrous):
+    """The same for specular light, in which only surfaces of the same roughness have a part."""
+
+    in_specular_albedo = In(GLOSS)
+    u_sigma_r = Uniform("float", "> 0, roughness edge-stopping")
+
+    def __init__(self, p: Svgf, step: int, pixel_size: float, raw: bool = False) -> None:
+        super().__init__(p, step, pixel_size, raw, glossy=True)
+
+
+def svgf(
+    g: Graph,
+    signals: dict[str, Tex],
+    guides: Guides,
+    p: Svgf,
+    pixel_size: float,
+    specular_albedo: Tex | None = None,
+) -> dict[str, Tex]:
+    """Filter each of ``signals`` (noisy irradiance by name, "direct", "indirect", "specular", or "both" for all as
+    one); returns the clean ones. ``specular_albedo`` (:data:`GLOSS`) steers the filter of specular light.
 
     All of them share one reprojection. Histories are named by the set of signals, so that filtering them together
     after filtering them apart begins with a new history, as it must; and by whether the signals hold the albedo.
@@ -97,12 +130,20 @@ def svgf(g: Graph, signals: dict[str, Tex], guides: Guides, p: Svgf, pixel_size:
         clean: dict[str, Tex] = {}
         for signal, noisy in signals.items():
             with g.scope(signal):
-                clean[signal] = _filter_signal(g, f"{names}.{signal}", noisy, found, guides, p, pixel_size)
+                gloss = specular_albedo if signal == "specular" else None
+                clean[signal] = _filter_signal(g, f"{names}.{signal}", noisy, found, guides, p, pixel_size, gloss)
         return clean
 
 
 def _filter_signal(
-    g: Graph, name: str, noisy: Tex, reprojection: Tex | None, guides: Guides, p: Svgf, pixel_size: float
+    g: Graph,
+    name: str,
+    noisy: Tex,
+    reprojection: Tex | None,
+    guides: Guides,
+    p: Svgf,
+    pixel_size: float,
+    gloss: Tex | None,
 ) -> Tex:
     x = noisy
     estimate: dict[str, Tex] = {}
@@ -113,10 +154,17 @@ def _filter_signal(
         estimate = {"in_moments": moments, "in_reprojection": reprojection}
     # Without time there is no other variance than the one in space; without guidance by variance there is none at all.
     shape = {"in_surface": guides.surface, "in_gradient": guides.gradient}
+    atrous = Atrous if gloss is None else GlossyAtrous
+    if gloss is not None:
+        shape["in_specular_albedo"] = gloss
     if p.variance_guided:
-        prefilter = {"PREFILTER": 1} if p.prefilter else None
+        prefilter = {"PREFILTER": 1} if p.prefilter else {}
         stage = Variance(u_sigma_z=p.sigma_z, u_pixel_size=pixel_size, defines=prefilter)
-        unfiltered, x = x, g.add(stage, in_color=x, **shape, **estimate).out_color
+        if gloss is not None:
+            stage = GlossyVariance(
+                u_sigma_z=p.sigma_z, u_sigma_r=p.sigma_r, u_pixel_size=pixel_size, defines=prefilter | GLOSSY
+            )
+        unfiltered, x = x, g.add(stage, "variance", in_color=x, **shape, **estimate).out_color
     else:
         unfiltered = x
     if history is not None and p.feedback < 0:
@@ -125,7 +173,7 @@ def _filter_signal(
     if reprojection is not None and p.variance_guided and p.accumulated_variance:
         length = {"in_reprojection": reprojection}
     for i in range(p.iterations):
-        iteration = Atrous(p, 1 << i, pixel_size, raw=x is noisy)
+        iteration = atrous(p, 1 << i, pixel_size, raw=x is noisy)
         x = g.add(iteration, f"atrous{i}", in_color=x, **shape, **(length if i == 0 else {})).out_color
         if history is not None and i == p.feedback:
             g.feed(history, x)  # no copy: x is written into the history's other half

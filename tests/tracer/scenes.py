@@ -201,6 +201,27 @@ def everything() -> Scene:
     return replace(scene(meshes, materials, camera, (0.4, 0.6, 0.9)), textures=textures)
 
 
+def glossy() -> Scene:
+    """A metal ball, a varnished and textured floor, a diffuse block, a sky, a lamp: both lobes at both hits."""
+    tiles = (np.random.default_rng(7).random((9, 14, 3)) * 255).astype(np.uint8)
+    materials = [
+        Material("varnish", (0.9, 0.8, 0.7), base_texture=0, specular=True, roughness=0.2),
+        Material("copper", (0.9, 0.6, 0.4), specular=True, metallic=1.0, roughness=0.4),
+        Material("plain", (0.6, 0.5, 0.4)),
+        Material("lamp", (0.5, 0.5, 0.5), emission=(5.0, 4.0, 3.0)),
+    ]
+    corner = np.array([(0, 0), (4, 0), (4, 4), (0, 4)], dtype=np.float64)
+    ball = sphere(0.5, (0.5, 0.5, 0.0), 2)
+    meshes = [
+        mesh("floor", quad((-2, 0, 2), (2, 0, 2), (2, 0, -2), (-2, 0, -2)), 0, uvs=corner[[[0, 1, 2], [0, 2, 3]]]),
+        mesh("ball", ball, 1, normals=(ball - np.array([0.5, 0.5, 0.0])) / 0.5),
+        mesh("block", box((-1.0, 0.1, -0.3), (-0.4, 0.7, 0.3)), 2),
+        mesh("lamp", quad((-0.3, 1.8, -0.3), (0.3, 1.8, -0.3), (0.3, 1.8, 0.3), (-0.3, 1.8, 0.3)), 3),
+    ]
+    camera = Camera.look_at((0.4, 1.3, 3.4), (0.0, 0.6, 0.0), yfov_degrees=50.0)
+    return replace(scene(meshes, materials, camera, (0.4, 0.6, 0.9)), textures=(Texture("tiles", tiles),))
+
+
 # ------------------------------------------------------------------------------------------------------------ tracing
 
 

@@ -21,7 +21,7 @@ from raytrace.scene import Scene
 from raytrace.shot import Shot
 from raytrace.tables import Variant
 from tests.tracer.conftest import OpenTracer
-from tests.tracer.scenes import cornell, everything, rigid
+from tests.tracer.scenes import cornell, everything, glossy, rigid
 
 SIZE = (8, 8)
 DARK = replace(
@@ -33,21 +33,24 @@ SCENES = {
     "sky and no lamp": replace(DARK, sky=(0.5, 0.5, 0.5)),
     "dark": DARK,
     "everything": everything(),
+    "glossy": glossy(),
     "a light and an environment": replace(
         DARK, lights=(PunctualLight("spot", "spot"),), environment=Environment("grey", np.ones((4, 8, 3), np.float32))
     ),
 }
 ALL_IMAGES = images_of(Variant(*(True for _ in Variant._fields)), positions=True)
+GLOSS = {"specular", "specular_albedo"}
 any_scene = pytest.mark.parametrize("what", SCENES.values(), ids=SCENES.keys())
 
 
 @pytest.mark.parametrize(
     ("what", "positions", "missing"),
     [
-        ("still", False, {"prev_normal", "position", "prev_position"}),
-        ("moving", False, {"position", "prev_position"}),
-        ("still", True, {"prev_normal"}),
-        ("everything", True, set()),
+        ("still", False, {"prev_normal", "position", "prev_position", *GLOSS}),
+        ("moving", False, {"position", "prev_position", *GLOSS}),
+        ("still", True, {"prev_normal", *GLOSS}),
+        ("everything", True, GLOSS),
+        ("glossy", True, {"prev_normal"}),
     ],
 )
 def test_frames_have_the_images_that_are_told(what: str, positions: bool, missing: set[str]) -> None:
@@ -60,7 +63,7 @@ def test_frames_have_the_images_that_are_told(what: str, positions: bool, missin
 
 
 def test_images_of_a_frame_are_all_told() -> None:
-    assert tuple(f.name for f in fields(FramePacket) if "F32" in str(f.type)) == ALL_IMAGES
+    assert {f.name for f in fields(FramePacket) if "F32" in str(f.type)} == set(ALL_IMAGES)
 
 
 @any_scene
@@ -92,9 +95,11 @@ def test_kernels_contain_what_the_scene_needs(trace: OpenTracer, what: Scene) ->
         "environment": variant.environment,
         "moving": variant.moving,
         "positions": tracer.settings.positions,
+        "specular": variant.specular,
     }
     kinds = {name: getattr(variant, name) for name in ("textured", "lamps", "punctual", "environment")}
-    assert first == second == kinds | {"has_sky": variant.sky}
+    masking = {"separable": False} if variant.specular else {}
+    assert first == second == kinds | {"has_sky": variant.sky} | masking
 
 
 def test_everything_is_counted() -> None:

@@ -21,6 +21,8 @@ def svgf(**changes: object) -> Config:
     return Config(svgf=replace(Svgf(), **changes))  # type: ignore[arg-type]
 
 
+GLOSSY = FrameTraits(specular=True)
+
 CASES: dict[str, tuple[Config, str, FrameTraits]] = {
     "none": (Config(), "none", FrameTraits()),
     "reference": (Config(), "reference", FrameTraits()),
@@ -51,6 +53,15 @@ CASES: dict[str, tuple[Config, str, FrameTraits]] = {
     "bmfr_without_demodulation": (load(None, ("bmfr.demodulate=false",)), "bmfr", FrameTraits()),
     "bmfr_moving": (Config(), "bmfr", FrameTraits(moving=True)),
     "bmfr_on_hardware": (Config(), "bmfr", FrameTraits(software=False)),
+    "none_glossy": (Config(), "none", GLOSSY),
+    "accumulate_glossy": (Config(), "accumulate", GLOSSY),
+    "svgf_glossy": (Config(), "svgf", GLOSSY),
+    "svgf_glossy_joint": (svgf(separate=False), "svgf", GLOSSY),
+    "svgf_glossy_without_demodulation": (svgf(demodulate=False), "svgf", GLOSSY),
+    "svgf_glossy_joint_without_demodulation": (svgf(demodulate=False, separate=False), "svgf", GLOSSY),
+    "bmfr_glossy": (load(None, ('bmfr.features="1,n,w,roughness"',)), "bmfr", GLOSSY),
+    "bmfr_glossy_joint": (load(None, ("bmfr.separate=false",)), "bmfr", GLOSSY),
+    "bmfr_glossy_without_demodulation": (load(None, ("bmfr.demodulate=false",)), "bmfr", GLOSSY),
     "svgf_moving": (Config(), "svgf", FrameTraits(moving=True)),
     "accumulate_auto_exposure": (Config(display=Display(auto_exposure=True)), "accumulate", FrameTraits()),
     "accumulate_mark_bad": (Config(display=Display(mark_bad="on")), "accumulate", FrameTraits()),

@@ -15,6 +15,9 @@ uniform sampler2D in_surface; // normal, depth
 #if HAS_IN_ALBEDO
 uniform sampler2D in_albedo;
 #endif
+#ifdef ROUGHNESS_AT
+uniform sampler2D in_roughness;
+#endif
 uniform mat3 u_view;   // from pixels at depth 1, depth to world space
 uniform vec2 u_jitter; // of the camera rays, pixels
 uniform ivec2 u_offset;
@@ -45,6 +48,7 @@ ivec2 size;
 ivec2 corner; // of the block
 vec4 origin, scale;
 vec3 middle_normal, middle_albedo;
+float middle_roughness;
 
 ivec2 pixel_of(int element) { return corner + ivec2(element % GROUP_X, element / GROUP_X); }
 
@@ -128,6 +132,10 @@ void write_features(ivec2 p, vec4 surface, vec4 place) {
     vec3 albedo = texelFetch(in_albedo, p, 0).rgb;
     albedo = is_finite(albedo) ? albedo - middle_albedo : vec3(0.0);
     row[ALBEDO_AT] = albedo.r, row[ALBEDO_AT + 1] = albedo.g, row[ALBEDO_AT + 2] = albedo.b;
+#endif
+#ifdef ROUGHNESS_AT
+    float roughness = texelFetch(in_roughness, p, 0).a;
+    row[ROUGHNESS_AT] = is_finite(vec3(roughness)) ? roughness - middle_roughness : 0.0;
 #endif
 }
 
@@ -222,6 +230,10 @@ void main() {
 #if ALBEDO_AT >= 0
     vec3 albedo = texelFetch(in_albedo, middle, 0).rgb;
     middle_albedo = is_finite(albedo) ? albedo : vec3(0.0);
+#endif
+#ifdef ROUGHNESS_AT
+    float roughness = texelFetch(in_roughness, middle, 0).a;
+    middle_roughness = is_finite(vec3(roughness)) ? roughness : 0.0;
 #endif
     fold_block(thread);
     merge_triangles(thread);

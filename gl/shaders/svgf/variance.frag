@@ -1,6 +1,6 @@
 // Variance in space where the history is too short for one in time. Schied et al. 2017, sec. 4.2.
 //
-// PREFILTER: the colour there is replaced by its mean in space, too.
+// GLOSSY: specular light, of surfaces of like roughness. PREFILTER: the colour there is replaced by its mean in space, too.
 
 #include "common/color.glsl"
 #include "common/finite.glsl"
@@ -11,6 +11,10 @@ uniform sampler2D in_moments; // first and second luminance moment
 uniform sampler2D in_reprojection; // w: history length before this frame
 #endif
 uniform sampler2D in_surface;
+#ifdef GLOSSY
+uniform sampler2D in_specular_albedo; // a: roughness
+uniform float u_sigma_r;
+#endif
 uniform sampler2D in_gradient;
 uniform float u_sigma_z;
 uniform float u_pixel_size;
@@ -51,6 +55,9 @@ void main() {
     ivec2 size = textureSize(in_color, 0);
     vec2 gradient = texelFetch(in_gradient, p, 0).xy;
     float floor_z = 0.1 * u_pixel_size * surface.w;
+#ifdef GLOSSY
+    float roughness = texelFetch(in_specular_albedo, p, 0).a;
+#endif
     for (int i = 0; i <= last; ++i) {
         ivec2 d = ivec2(i % 7, i / 7) - 3;
         ivec2 q = p + d;
@@ -59,7 +66,13 @@ void main() {
         float n = max(dot(surface.xyz, s.xyz), 0.0);
         n *= n; n *= n; n *= n; n *= n; n *= n; n *= n; n *= n; // ^128
         float range = u_sigma_z * abs(dot(gradient, vec2(d))) + floor_z * length(vec2(d)) + 1e-30;
-        float w = sane_weight(n * exp(-abs(surface.w - s.w) / range));
+        float e = abs(surface.w - s.w) / range;
+#ifdef GLOSSY
+        vec4 gloss = texelFetch(in_specular_albedo, q, 0);
+        e += abs(roughness - gloss.a) / u_sigma_r;
+        e = gloss.r + gloss.g + gloss.b > 0.0 ? e : 1e30; // where nothing shines there is no light to tell of
+#endif
+        float w = sane_weight(n * exp(-e));
         sum += w * vec3(moments_at(q), 1.0);
 #ifdef PREFILTER
         colors += w * color_at(q).rgb;
