@@ -102,7 +102,10 @@ def _add_denoiser(parser: Parser, known: Sequence[str], text: str) -> None:
 
 def _add_scene(parser: Parser) -> None:
     parser.add_argument(
-        "--scene", default="cornell", metavar="S", help=f"cornell, interior, or a file: {SCENE_FILES} (default cornell)"
+        "--scene",
+        default="cornell",
+        metavar="S",
+        help=f"one of app.py scenes, or a file: {SCENE_FILES} (default cornell)",
     )
     _add_environment(parser)
 
@@ -193,7 +196,8 @@ def window_parser() -> Parser:
     parser.add_argument(
         "--camera",
         metavar="C",
-        help="still, flight (if the scene has one), or the file of a camera path; see app.py render --help. "
+        help="still, flight (if the scene has one), one of the file's cameras by name, or the file of a camera path; "
+        "see app.py render --help. "
         "Default: still in the window, flight in the demo",
     )
     parser.add_argument("--no-hud", action="store_true", help="begin without the panel over the picture; G shows it")
@@ -216,7 +220,13 @@ def render_parser() -> Parser:
         "app.py render",
         "Render frames 0 to N-1 of a shot and write the last as PNG; prints the name of each file written.\n"
         "The picture is after anti-aliasing and tone mapping. Scene time advances by 1/30 s per frame.",
-        "A camera path is JSON; its last camera stays to the end:\n"
+        "A camera path is TOML, keyframes with a smooth curve between them, such as the window records with C:\n"
+        "  [[key]]\n"
+        "  time = 0.0                     # seconds\n"
+        "  position = [2.25, 1.5, 2.0]\n"
+        "  target = [-0.4, 1.0, -1.1]     # or forward = [x, y, z], a direction\n"
+        "  yfov = 45.0                    # degrees from bottom to top; may be left out, as may up = [x, y, z]\n"
+        "or JSON, a camera for each frame; its last camera stays to the end:\n"
         '  {"frames": [{"camera_to_world_gl": [[..4..], [..4..], [..4..], [..4..]], "yfov_deg": 45}, ...]}\n'
         "The matrix acts on column vectors and has OpenGL's axes: x right, y up, looking along -z.\n\n"
         "examples:\n"
@@ -251,7 +261,8 @@ def render_parser() -> Parser:
         "--camera",
         default="still",
         metavar="C",
-        help="still, flight (if the scene has one), or the file of a camera path, see below (default still)",
+        help="still, flight (if the scene has one), one of the file's cameras by name, or the file of a camera path, "
+        "see below (default still)",
     )
     parser.add_argument("--animate", action="store_true", help="objects and lamps move, where the scene has such")
     parser.add_argument(

@@ -13,13 +13,13 @@ import assets
 from config import Config, Surroundings
 from console import Progress
 from errors import Notices, UserError, did_you_mean
-from raytrace.camera import Camera
+from raytrace.camera_path import PATH_FORMATS, read_camera_path
 from raytrace.compile_events import watch_kernels
 from raytrace.compiled import CompiledScene, compile_scene
 from raytrace.integrator import Settings, Tracer
 from raytrace.sampling import HALTON, HASH
 from raytrace.scene import Scene
-from raytrace.shot import Shot, read_camera_path
+from raytrace.shot import CameraPath, Shot
 
 NOTHING_AROUND = Surroundings()
 
@@ -79,7 +79,7 @@ def _scene(name: str, animate: bool, surrounded: bool) -> Scene:
     if Path(name).suffix or Path(name).exists():
         from raytrace.load import load_scene  # slow to import, and not needed above
 
-        return load_scene(name, surrounded)
+        return load_scene(name, surrounded, animate)
     raise UserError(
         f"--scene {name}: neither a built-in scene nor a file{did_you_mean(name, assets.SCENES)}",
         f"built in are: {', '.join(assets.SCENES)}",
@@ -124,22 +124,17 @@ def open_shot(
 ) -> Shot:
     """Everything between a scene's name and its frames. Progress and the loader's notices go to ``log``, or to stderr.
 
-    ``camera``: "still", "flight", the path of a camera path in JSON, or None for the flight if the scene has one.
+    ``camera``: "still", "flight", the name of one of the scene's cameras, the file of a camera path, or None for the
+    flight if the scene has one.
     Raises UserError for a scene or camera that cannot be had, and for a picture that memory has no room for.
     """
     log = log or Terminal()
     size = config.render.width, config.render.height
     require_memory(size)
-    path = None if camera is None else _camera_path(camera)
     with log.stage(f"{Path(name).name}: reading"):
         scene = find_scene(name, animate, config.surroundings)
     tell_notices(scene, animate, log)
-    if path is None:
-        path = "still" if scene.flight is None else "flight"
-    if path == "flight" and scene.flight is None:
-        raise UserError(
-            f"--camera flight: {scene.name} has no flight", "use --camera still, or a camera path: --camera path.json"
-        )
+    path = _camera_path(scene, camera)
     compiled, tracer = open_tracer(scene, config, log=log)
     return Shot(compiled, tracer, size, path, animate, jitter)
 
@@ -149,17 +144,33 @@ def tell_notices(scene: Scene, animate: bool, log: Log | None = None) -> None:
     log = log or Terminal()
     for notice in scene.notices:
         log.notice(f"{scene.name}: {notice}")
-    if animate and not scene.has_motion:
+    if animate and not scene.animated:
         log.notice(f"{scene.name}: nothing in this scene moves")
 
 
-def _camera_path(camera: str) -> str | list[Camera]:
-    if camera in ("still", "flight"):
+def _camera_path(scene: Scene, camera: str | None) -> CameraPath:
+    """What ``--camera`` means: a word, one of the scene's own cameras, or a file. Raises UserError."""
+    if camera is None:
+        camera = "still" if scene.flight is None else "flight"
+    if camera == "still":
         return camera
-    if not Path(camera).suffix and not Path(camera).exists():
-        hint = did_you_mean(camera, ("still", "flight"))
-        raise UserError(f"--camera {camera}: neither still nor flight nor a file{hint}")
-    return read_camera_path(Path(camera))
+    if camera == "flight":
+        if scene.flight is None:
+            raise UserError(
+                f"--camera flight: {scene.name} has no flight",
+                "use --camera still, or a camera path: --camera path.toml",
+            )
+        return camera
+    for own in scene.cameras:
+        if own.name == camera:
+            return own.flight or [own.camera]
+    if Path(camera).suffix in PATH_FORMATS or Path(camera).exists():
+        return read_camera_path(Path(camera))
+    names = ("still", "flight", *(own.name for own in scene.cameras))
+    raise UserError(
+        f"--camera {camera}: no camera of {scene.name}, and no file{did_you_mean(camera, names)}",
+        f"there are: {', '.join(names)}, or a camera path ({', '.join(PATH_FORMATS)})",
+    )
 
 
 def require_memory(size: tuple[int, int]) -> None:

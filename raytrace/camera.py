@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -88,6 +89,15 @@ class Camera:
         )
         # pyrr writes matrices for row vectors; ours are for column vectors.
         return np.ascontiguousarray((view @ projection).T, dtype=np.float32)
+
+
+@dataclass(frozen=True)
+class NamedCamera:
+    """One of a scene's cameras. ``flight``: the camera at a time in seconds, None where it stands still."""
+
+    name: str
+    camera: Camera
+    flight: Callable[[float], Camera] | None = None
 
 
 def _triple(v: F64) -> Vector:

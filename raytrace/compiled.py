@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from errors import UserError
 from raytrace.camera import Camera
 from raytrace.light_tables import Lights, collect_lights, no_lights
+from raytrace.punctual import punctual_rows
 from raytrace.scene import Mesh, Scene
 from raytrace.textures import TextureAtlas, build_atlas
 
@@ -101,8 +102,15 @@ class CompiledScene:
     def has_motion(self) -> bool:
         return self.static_count < len(self.triangles)
 
+    @property
+    def moves(self) -> bool:
+        """Whether :meth:`move_to` changes anything."""
+        return self.has_motion or self.scene.animated
+
     def move_to(self, time: float, previous_time: float) -> None:
-        """Write the moving triangles' positions and normals at both times (seconds)."""
+        """Write the moving triangles' positions and normals at both times (seconds), and where lights are."""
+        if self.moves:
+            self.lights.punctual[:] = punctual_rows(self.scene.lights, self.origin, time)
         if not self.has_motion:
             return
         self.triangles[self.static_count :] = self._moving_at(time)

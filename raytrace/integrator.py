@@ -168,7 +168,7 @@ class Tracer:
         self._scratch = _Scratch()
         self.threads = self.settings.threads or len(os.sched_getaffinity(0))
         self._pool = ThreadPoolExecutor(self.threads, "trace") if self.threads > 1 else None
-        self._time: tuple[float, float] | None = (0.0, 0.0) if not scene.has_motion else None
+        self._time: tuple[float, float] | None = (0.0, 0.0) if not scene.moves else None
 
     @property
     def kernels(self) -> tuple[Callable[..., object], ...]:
@@ -195,9 +195,10 @@ class Tracer:
 
     def set_time(self, now: float, previous: float) -> None:
         """Move what moves to time ``now``; the previous positions are those at ``previous`` (seconds)."""
-        if self.scene.has_motion and self._time != (now, previous):
+        if self.scene.moves and self._time != (now, previous):
             self.scene.move_to(now, previous)
-            self.rays.move(self.scene.triangles, self.scene.moving_box())
+            if self.scene.has_motion:
+                self.rays.move(self.scene.triangles, self.scene.moving_box())
             self._time = (now, previous)
 
     def primary(self, view: View, pixels: I32) -> Hits:

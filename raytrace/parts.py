@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from raytrace.camera import Camera
+from raytrace.camera import NamedCamera
 from raytrace.punctual import PunctualLight
 from raytrace.scene import Material, Mesh, Texture
 
@@ -40,7 +40,7 @@ class Model:
     meshes: list[Mesh]
     materials: list[Material]
     textures: list[Texture] = field(default_factory=list)
-    camera: Camera | None = None
+    cameras: list[NamedCamera] = field(default_factory=list)
     lights: list[PunctualLight] = field(default_factory=list)
 
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import Final, Literal
 
 import numpy as np
@@ -32,7 +32,7 @@ class PunctualLight:
     ``position`` in world space and ``direction``, unit, the way it shines (not for "point"). ``intensity``: linear
     Rec. 709 per steradian, for "directional" irradiance on a surface that faces it. ``inner``, ``outer``: radians from
     the axis of a "spot", at which it begins to fall off and where it ends, 0 <= inner < outer <= pi / 2. ``range``:
-    distance at which "point" and "spot" have faded to 0.
+    distance at which "point" and "spot" have faded to 0. ``motion``: position and direction at a time in seconds.
     """
 
     name: str
@@ -43,6 +43,14 @@ class PunctualLight:
     inner: float = 0.0
     outer: float = math.pi / 4
     range: float = math.inf
+    motion: Callable[[float], tuple[Vector, Vector]] | None = None
+
+    def at(self, time: float) -> PunctualLight:
+        """The light where it is at ``time`` seconds."""
+        if self.motion is None:
+            return self
+        position, direction = self.motion(time)
+        return replace(self, position=position, direction=direction)
 
     def power(self, radius: float) -> float:
         """Emitted power, as luminance; of "directional" what a ball of ``radius`` around the scene receives."""
@@ -55,10 +63,11 @@ class PunctualLight:
         return math.pi * radius**2 * luminance
 
 
-def punctual_rows(lights: Sequence[PunctualLight], origin: F64) -> F32:
-    """(max(1, P), ROW) float32, positions relative to ``origin``; one row of zeros where there is no light."""
+def punctual_rows(lights: Sequence[PunctualLight], origin: F64, time: float = 0.0) -> F32:
+    """(max(1, P), ROW) float32 as at ``time`` seconds, positions relative to ``origin``; a row of zeros where there is
+    no light."""
     rows = np.zeros((max(1, len(lights)), ROW))
-    for row, light in zip(rows, lights, strict=False):
+    for row, light in zip(rows, (light.at(time) for light in lights), strict=False):
         row[KIND] = KINDS.index(light.kind)
         row[POSITION : POSITION + 3] = np.array(light.position) - origin
         row[DIRECTION : DIRECTION + 3] = np.array(light.direction) / np.linalg.norm(light.direction)
@@ -66,5 +75,5 @@ def punctual_rows(lights: Sequence[PunctualLight], origin: F64) -> F32:
         # KHR_lights_punctual, "Inner and Outer Cone Angles".
         row[CONE_SCALE] = 1.0 / max(0.001, math.cos(light.inner) - math.cos(light.outer))
         row[CONE_OFFSET] = -math.cos(light.outer) * row[CONE_SCALE]
-        row[INVERSE_RANGE] = 0.0 if math.isinf(light.range) else 1.0 / light.range
+        row[INVERSE_RANGE] = 0.0 if math.isinf(light.range) else 1.0 / max(light.range, 1e-18)
     return rows.astype(np.float32)

@@ -10,12 +10,12 @@ a loader whose format counts from the top flips both. Colours are linear Rec. 70
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from raytrace.camera import Camera
+from raytrace.camera import Camera, NamedCamera
 from raytrace.environment import Environment
 from raytrace.punctual import PunctualLight
 
@@ -105,7 +105,8 @@ class Scene:
 
     ``sky``: radiance of the constant sky, or None: then a ray that leaves the scene brings nothing.
     ``environment``: light from all around instead of the constant sky; ``lights``: those without a surface.
-    ``flight``: camera at a time in seconds, for demos and measurements; None: the still camera.
+    ``flight``: camera at a time in seconds, for demos and measurements; None: the still camera. ``cameras``: those that
+    can be asked for by name.
     ``notices``: what the loader repaired or approximated, one line each.
     """
 
@@ -119,6 +120,7 @@ class Scene:
     notices: tuple[str, ...] = field(default=())
     lights: tuple[PunctualLight, ...] = ()
     environment: Environment | None = None
+    cameras: tuple[NamedCamera, ...] = ()
 
     @property
     def triangle_count(self) -> int:
@@ -127,6 +129,17 @@ class Scene:
     @property
     def has_motion(self) -> bool:
         return any(m.motion is not None for m in self.meshes)
+
+    @property
+    def animated(self) -> bool:
+        """Whether an object or a light moves."""
+        return self.has_motion or any(light.motion is not None for light in self.lights)
+
+    def standing(self) -> Scene:
+        """The same without motion of objects and lights, as they are at time 0."""
+        meshes = tuple(mesh if mesh.motion is None else _standing(mesh) for mesh in self.meshes)
+        lights = tuple(replace(light.at(0.0), motion=None) for light in self.lights)
+        return replace(self, meshes=meshes, lights=lights)
 
     def bounds(self) -> tuple[F64, F64]:
         """Lower and upper corner of everything at time 0, each (3,) float64, world space."""
@@ -144,3 +157,11 @@ class Scene:
         """Centre of the bounds, (3,) float64: subtracted before anything becomes float32."""
         lower, upper = self.bounds()
         return (lower + upper) / 2
+
+
+def _standing(mesh: Mesh) -> Mesh:
+    assert mesh.motion is not None
+    matrix = mesh.motion(0.0)
+    turn, shift = matrix[:3, :3], matrix[:3, 3]
+    normals = None if mesh.normals is None else np.ascontiguousarray(mesh.normals @ turn.T.astype(np.float32))
+    return replace(mesh, vertices=mesh.vertices @ turn.T + shift, normals=normals, motion=None)

@@ -33,6 +33,8 @@ class Action(Enum):
     """Show or hide something that is no parameter of the picture [a switch of :class:`ui.state.State`]."""
     RESOLUTION = auto()
     """Render at the next size of the ladder [+1 or -1]."""
+    PATH = auto()
+    """Note the camera of every frame from now on, or stop and write what was noted."""
     SCREENSHOT = auto()
     BACK = auto()
     """Let go of the mouse or, if it is free, close the window."""
@@ -81,6 +83,7 @@ BINDINGS: Final = (
     Binding("PERIOD", Action.STEP, "one step of the animation, then stop"),
     Binding("N", Action.NEXT_SCENE, "next of the scenes that come with the program"),
     Binding("R", Action.RESET_CAMERA, "camera back to where it began"),
+    Binding("C", Action.PATH, "record the camera's path; once more: save it as camera_NNN.toml, for --camera"),
     Binding("H", Action.RESET_HISTORY, "forget what was accumulated over time"),
     Binding("B", Action.VIEW, "look at the next texture of the graph, after the last at the picture again", "+1"),
     Binding("V", Action.VIEW, "look at the texture before", "-1"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
+from raytrace.camera import Camera
 from raytrace.frame import FramePacket
 from raytrace.shot import FPS, Shot
 from raytrace.worker import Request, Worker
@@ -27,6 +28,7 @@ class Stage:
         self._worker = Worker(shot.tracer, wake)
         self._frame = -1  # of the scene's time, traced last
         self._look = (0.0, 0.0)
+        self._path: list[Camera] = []
 
     @property
     def idle(self) -> bool:
@@ -44,9 +46,16 @@ class Stage:
             self.control.home()
         look, self._look = self._look, (0.0, 0.0)
         camera = self.control.next(held.drain(time.perf_counter()), look)
+        if state.path:
+            self._path.append(camera)
         if state.animate or state.step or self._frame < 0:
             self._frame, state.step = self._frame + 1, False
         self._worker.submit(Request(camera, size, self._frame / FPS, state.jitter, cut))
+
+    def take_path(self) -> list[Camera]:
+        """The cameras noted since the last call, one for each frame that was begun."""
+        path, self._path = self._path, []
+        return path
 
     def take(self) -> FramePacket | None:
         """The frame under way, or None if it is not ready."""

@@ -47,7 +47,7 @@ class State:
     ``view``: name of the texture looked at, :data:`PICTURE` for none; ``look``: how it is shown; ``textures``: the
     names there are, as the last frame left them. ``split``: the noisy frame is shown to the left of the mouse.
     ``hud``: the panel is shown. ``help``: the list of keys is. ``inspect``: the numbers of the pixel under the mouse
-    are.
+    are. ``path``: the camera of every frame is noted.
 
     Wishes, which whoever fulfils them takes back: ``reset``, why the next frame may use no history; ``home``, camera
     back to where it began; ``step``, one frame more of the animation; ``scene``, a scene to open, by name or path;
@@ -67,6 +67,7 @@ class State:
     hud: bool = False
     help: bool = False
     inspect: bool = False
+    path: bool = False
     reset: str = ""
     home: bool = False
     step: bool = False
@@ -177,6 +178,9 @@ class State:
                 self.news = f"{binding.value} {'on' if value else 'off'}"
             case Action.RESOLUTION:
                 self.resolution += int(binding.value)
+            case Action.PATH:
+                self.path = not self.path
+                self.news = "recording the camera's path" if self.path else ""
             case Action.SCREENSHOT:
                 self.screenshot = True
             case Action.BACK:

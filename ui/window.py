@@ -31,7 +31,7 @@ from ui.opening import Opening
 from ui.overlay import Overlay
 from ui.present import Presenter, letterbox
 from ui.resolution import Calibration, step
-from ui.screenshot import save_screenshot
+from ui.screenshot import save_path, save_screenshot
 from ui.stage import Stage
 from ui.state import PICTURE, State
 from ui.status import Status
@@ -144,6 +144,7 @@ class Viewer:
             print(f"OpenGL reports {error}: a mistake of this program, or of the driver", file=sys.stderr)
         if self._opening is not None:
             self._opening.close()
+        self._save_path()
         self._stack.close()
 
     def _handle(self, event: Event) -> None:
@@ -203,6 +204,8 @@ class Viewer:
             self._calibration = None
             rungs, state.resolution = state.resolution, 0
             self._resize(step(self._base, self._size, rungs))
+        if not state.path:
+            self._save_path()
         if state.next_scene:
             state.next_scene = False
             names = list(assets.SCENES)
@@ -234,11 +237,17 @@ class Viewer:
             self.state.news = str(error).partition("\n")[0]
             self._refused = str(error)
             return
+        self._save_path()
         self.stage.close()
         self.stage = Stage(shot, self._wishes.camera != "still", self.window.wake)
         self.status.scene, self.status.packet, self.status.result = self.stage.name, None, None
         self.state.news = "\n".join(opening.notices).partition("\n")[0] or f"opened {self.stage.name}"
         self._calibrate()
+
+    def _save_path(self) -> None:
+        """Write the cameras that were noted, if any were."""
+        if path := self.stage.take_path():
+            self.state.tell(save_path(self._wishes.out, path, self.stage.name))
 
     def _calibrate(self) -> None:
         """Look for the resolution to show this scene in."""

@@ -195,6 +195,12 @@ def test_wishes():
     assert s.screenshot
 
 
+def test_a_camera_path_is_recorded_until_the_key_comes_again():
+    s = press(state(), "C")
+    assert (s.path, s.news) == (True, "recording the camera's path")
+    assert not press(s, "C").path
+
+
 def test_jitter_is_switched_from_what_it_is():
     s = press(state(), "F6")
     assert (s.jitter, s.config.render.jitter) == (False, "off")

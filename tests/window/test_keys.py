@@ -6,11 +6,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import assets
+from raytrace.camera_path import read_keyframes
+from raytrace.shot import FPS
 from tests.window.desktop import F32, START_SECONDS, STILL, App, application, difference, plan, roughness, wait_for
 from ui.keys import BINDINGS, Binding
 
@@ -253,6 +256,20 @@ def screenshot(app: App) -> None:
     assert f"\n{name}\n" in app.stdout()
 
 
+def camera_path(app: App) -> None:
+    app.ask("c", "recording the camera's path")
+    app.hold("d", 0.4)
+    name = app.ask("c", r"^frame \d+: saved (.*camera_\d+\.toml)$")[1]
+    keys, _ = read_keyframes(Path(name))
+    assert len(keys) >= 2
+    assert [key.time for key in keys] == [index / FPS for index in range(len(keys))]
+    first, last = keys[0].camera, keys[-1].camera
+    assert first == assets.build("cornell").camera
+    way = np.array(last.position) - first.position
+    assert way @ first.basis()[0] > 0.1
+    assert f"\n{name}\n" in app.stdout()
+
+
 def let_go(app: App) -> None:
     """While the mouse turns the camera; a later test has the other meaning of Escape."""
     app.xdotool("mousemove", "--window", app.window, 320, 100, "mousedown", 3, "sleep", 0.3)
@@ -315,6 +332,7 @@ CHECKS: dict[str, Callable[[App], None]] = {
     "PERIOD": single_step,
     "N": next_scene,
     "R": camera_home,
+    "C": camera_path,
     "H": history,
     "B": next_texture,
     "V": texture_before,
