@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -55,7 +56,7 @@ def blocks(images: F64) -> F64:
 
 
 @pytest.mark.parametrize("make", [cornell, textured, metallic])
-def test_the_mean_of_many_frames_is_mitsubas(trace: OpenTracer, tmp_path: Path, make: type[Scene]) -> None:
+def test_the_mean_of_many_frames_is_mitsubas(trace: OpenTracer, tmp_path: Path, make: Callable[[], Scene]) -> None:
     """One path per pixel, camera rays anywhere in their pixels; masking in the separable form that Mitsuba has."""
     what = make()
     # The kernels of the other tests of glossy scenes are there already.
