@@ -157,10 +157,10 @@ def play(
 
 
 def compare(
-    footage: Footage, methods: Sequence[Method], config: Config, new_renderer: NewRenderer
+    footage: Footage, methods: Sequence[tuple[Method, Config]], new_renderer: NewRenderer
 ) -> tuple[Outcome, ...]:
-    """All ``methods``, of which the first must be the noisy frame itself: the ratios are to it."""
-    outcomes = [play(footage, method, config, new_renderer) for method in methods]
+    """All ``methods``, each with its parameters; the first must be the noisy frame itself, the ratios are to it."""
+    outcomes = [play(footage, method, config, new_renderer) for method, config in methods]
     noisy = outcomes[0]
     return tuple(
         replace(o, rmse_ratio=o.rmse / noisy.rmse, temporal_ratio=o.temporal / noisy.temporal) for o in outcomes

@@ -6,7 +6,7 @@ Switching a stage off is a Python ``if`` here and a rebuild, never a branch in a
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from config import Config, Display, Svgf
 from gl.graph import Graph, Tex
@@ -144,7 +144,8 @@ def _bmfr(g: Graph, config: Config, traits: FrameTraits) -> Tex:
     guides, change = Guides(g, traits.moving), None
     if p.adaptive and p.temporal:
         with g.scope("bmfr"):
-            change = change_of(g, s.direct, s.indirect, guides, config.asvgf, traits.pixel_size, joint=True)
+            gradients = replace(config.asvgf, gain=p.gain)
+            change = change_of(g, s.direct, s.indirect, guides, gradients, traits.pixel_size, joint=True)
     clean = bmfr(g, signals, s.albedo, guides, p, view, change)
     return g.add(display.Modulate(), in_direct=clean, in_emission=s.emission, **albedo_after).out_radiance
 

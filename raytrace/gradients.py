@@ -286,9 +286,10 @@ def _note(  # type: ignore[no-untyped-def]
             i = corner + j // columns * width + j % columns
             if triangle[i] >= 0 and i != carried:
                 count += 1
-                light = _luminance(direct, i) + _luminance(indirect, i)
-                if light > most:
-                    best, most = i, light
+                if brightest:
+                    light = _luminance(direct, i) + _luminance(indirect, i)
+                    if light > most:
+                        best, most = i, light
         if not brightest and count > 0:
             place = int(wang(uint32(path_key(seed, k) ^ uint32(frame * uint32(0x9E3779B9)))) % uint32(count))
             for j in range(columns * lines):
