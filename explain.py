@@ -144,7 +144,7 @@ def tracer_section(subject: Subject) -> list[str]:
     scenes = "two scenes, that of what moves built anew every frame" if tracer.variant.moving else "one scene"
     rows.append(("Embree", tracer.rays.name, scenes))
     rule = remembered(config, subject.denoiser)
-    place = f"1 in {STRATUM}x{STRATUM} pixels, {rule}: in the place of another, no more rays"
+    place = f"1 in {STRATUM}x{STRATUM} pixels, {rule}; no ray more"
     rows.append(("sample", "carried over", place if rule else "none: the method does not ask for any"))
     wish = f"render.jitter = {_value(config.render.jitter)}"
     state = State(config, subject.denoiser)
