@@ -41,6 +41,10 @@ class Film:
     scored: tuple[int, ...]
     camera: str = "still"
 
+    def first(self, frames: int) -> Film:
+        """The film's beginning, all of it if it is no longer."""
+        return replace(self, frames=min(frames, self.frames), scored=tuple(i for i in self.scored if i < frames))
+
     def open(self, config: Config, size: tuple[int, int]) -> Shot:
         """The shot in pictures of ``size``. Its tracer is the caller's to close."""
         sized = replace(config, render=replace(config.render, width=size[0], height=size[1]))

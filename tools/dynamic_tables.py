@@ -11,7 +11,7 @@ import time
 from collections.abc import Sequence
 
 from assets import dynamics
-from bench.dynamic import FILMS, Footage, Outcome, compare, shoot
+from bench.dynamic import FILMS, Film, Footage, Outcome, compare, shoot
 from bench.methods import NOISY, Method, NewRenderer
 from bench.references import ReferenceCache
 from cli import size_of
@@ -41,20 +41,20 @@ def methods() -> list[tuple[Method, Config]]:
     return [(NOISY, Config()), *((Method(name, d), load(None, sets)) for name, (d, sets) in METHODS.items())]
 
 
-def errors(new_renderer: NewRenderer, names: Sequence[str], size: Size, samples: int, cache: ReferenceCache) -> None:
+def errors(new_renderer: NewRenderer, films: Sequence[Film], size: Size, samples: int, cache: ReferenceCache) -> None:
     """Print RMSE and temporal error of every method on every film, in parts of the noisy frames' own."""
     rows: dict[str, list[Outcome]] = {}
-    for name in names:
-        footage = shoot(FILMS[name], Config(), size, samples, cache)
+    for film in films:
+        footage = shoot(film, Config(), size, samples, cache)
         try:
             for outcome in compare(footage, methods(), new_renderer):
                 rows.setdefault(outcome.name, []).append(outcome)
-            if name == "switching":
+            if film.name == "switching":
                 _print_switch(footage, [outcomes[-1] for outcomes in rows.values()])
         finally:
             footage.shot.tracer.close()
-    print(f"\n| method | {' | '.join(f'`{name}`' for name in names)} |")
-    print(f"| --- |{' --: |' * len(names)}")
+    print(f"\n| method | {' | '.join(f'`{film.name}`' for film in films)} |")
+    print(f"| --- |{' --: |' * len(films)}")
     for method, outcomes in rows.items():
         cells = (f"{o.rmse_ratio:.3f}, {o.temporal_ratio:.3f}" for o in outcomes)
         print(f"| {method} | {' | '.join(cells)} |", flush=True)
@@ -73,7 +73,7 @@ def _print_switch(footage: Footage, outcomes: Sequence[Outcome]) -> None:
 
 
 def times(new_renderer: NewRenderer, size: Size, frames: int = 24) -> None:
-    """Print medians: tracing with gradients and without, and the filters, all in turns."""
+    """Print medians of processor time: tracing with gradients and without, and the filters, all in turns."""
     film = FILMS["moving"]
     shot = film.open(Config(), size)
     plain: list[float] = []
@@ -82,10 +82,10 @@ def times(new_renderer: NewRenderer, size: Size, frames: int = 24) -> None:
         for remember, kept in (("", plain), ("random", carried)):
             shot.remember = remember
             for index in range(frames):
-                start = time.perf_counter()
+                start = time.process_time()
                 shot.frame(index)
                 if index > 3 or repeat:
-                    kept.append(time.perf_counter() - start)
+                    kept.append(time.process_time() - start)
     base, with_gradients = (statistics.median(kept) * 1e3 for kept in (plain, carried))
     print(f"tracing {base:.1f} ms, with gradients {with_gradients:.1f} ms ({with_gradients / base - 1:+.1%})")
     chosen = [
@@ -99,32 +99,37 @@ def times(new_renderer: NewRenderer, size: Size, frames: int = 24) -> None:
     for index in range(frames):
         packet = shot.frame(index)
         for method, config in chosen:
-            start = time.perf_counter()
+            start = time.process_time()
             renderer = renderers[method.name]
             renderer.run(packet, config, method.denoiser)
             renderer.ctx.finish()
             if index > 3:
-                spent[method.name].append(time.perf_counter() - start)
+                spent[method.name].append(time.process_time() - start)
     for name, values in spent.items():
         renderers[name].release()
         print(f"{name}: {statistics.median(values) * 1e3:.1f} ms")
     shot.tracer.close()
 
 
-def main() -> None:
-    """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("films", nargs="*", default=list(FILMS), help=", ".join(FILMS))
-    parser.add_argument("--size", default="320x180", help="WxH")
-    parser.add_argument("--samples", type=int, default=512, help="paths per pixel of references")
+def build_parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="dynamic_tables", description="Print tables of methods in changing light.")
+    parser.add_argument("films", nargs="*", help=f"of {', '.join(FILMS)} (default: all)")
+    parser.add_argument("--size", default="320x180", metavar="WxH", help="size in pixels (default 320x180)")
+    parser.add_argument("--samples", type=int, default=512, help="paths per pixel of references (default 512)")
+    parser.add_argument("--frames", type=int, default=48, help="of each film, 78 at most (default 48)")
     parser.add_argument("--times", action="store_true", help="times only")
-    args = parser.parse_args()
+    return parser
+
+
+def main() -> None:
+    args = build_parser().parse_args()
     ctx = create_headless()
     size = size_of(args.size)
     if args.times:
         times(lambda: Renderer(ctx), size)
     else:
-        errors(lambda: Renderer(ctx), args.films, size, args.samples, ReferenceCache())
+        films = [FILMS[name].first(args.frames) for name in args.films or FILMS]
+        errors(lambda: Renderer(ctx), films, size, args.samples, ReferenceCache())
     ctx.release()
 
 

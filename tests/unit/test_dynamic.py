@@ -52,6 +52,9 @@ def test_every_film_is_scored_in_pairs_that_it_has() -> None:
         assert film.scored == tuple(sorted(set(film.scored)))
         assert film.scored[-1] < film.frames
         assert any(frame + 1 in film.scored for frame in film.scored)
+        short = film.first(40)
+        assert (short.frames, short.scored) == (40, tuple(i for i in film.scored if i < 40))
+        assert film.first(1000) == film
 
 
 def test_a_switch_is_followed_by_the_method_that_knows_of_it(ctx: moderngl.Context, tmp_path: Path) -> None:
