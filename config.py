@@ -181,8 +181,9 @@ class Bmfr(Section):
     fast_frames: int = param(6, 1, 32, "[1;32] those last frames")
     fast_sigma: float = param(2.0, 0, 10, "[0;10] reach of that bound, in their standard deviations")
     adaptive: bool = param(
-        False, doc="cut both histories where light has changed, as A-SVGF does, by its parameters", structural=True
+        False, doc="cut both histories where light has changed, by A-SVGF's gradients and parameters", structural=True
     )
+    gain: float = param(3.0, 0, 1000, "[0;1000] asvgf.gain of these histories, which are longer than A-SVGF's")
     fit: bool = param(
         True, doc="fit blocks by features; off: what was accumulated before", structural=True, heading="regression"
     )

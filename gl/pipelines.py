@@ -206,7 +206,8 @@ def _bmfr(g: Graph, config: Config, traits: FrameTraits) -> Tex:
     change = None
     if p.adaptive and p.temporal:
         with g.scope("bmfr"):
-            change = change_of(g, s.direct, s.indirect, guides, config.asvgf, traits.pixel_size, joint=True)
+            gradients = replace(config.asvgf, gain=p.gain)
+            change = change_of(g, s.direct, s.indirect, guides, gradients, traits.pixel_size, joint=True)
     clean = bmfr(g, signals, features, guides, p, view, change=change)
     return display.modulate(g, in_direct=clean, in_emission=s.emission, **second, **albedos)
 
