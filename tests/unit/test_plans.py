@@ -79,6 +79,7 @@ CASES: dict[str, tuple[Config, str, FrameTraits]] = {
     "bmfr_glossy_joint": (load(None, ("bmfr.separate=false",)), "bmfr", GLOSSY),
     "bmfr_glossy_without_demodulation": (load(None, ("bmfr.demodulate=false",)), "bmfr", GLOSSY),
     "svgf_moving": (Config(), "svgf", FrameTraits(moving=True)),
+    "svgf_growing": (svgf(normal_history=128), "svgf", FrameTraits()),
     "svgf_welford": (svgf(variance="welford"), "svgf", FrameTraits()),
     "svgf_welford_mean": (svgf(variance="welford-mean"), "svgf", FrameTraits()),
     "svgf_variance_in_space": (svgf(variance="spatial", separate=False), "svgf", FrameTraits()),
