@@ -401,7 +401,9 @@ def record_parser() -> Parser:
         metavar="M",
         help="paths per pixel of a reference for each frame (default: no references)",
     )
-    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder to record to")
+    parser.add_argument(
+        "--out", type=Path, default=Path("out/recording"), metavar="DIR", help="folder (default out/recording)"
+    )
     _add_seed(parser)
     _add_settings(parser)
     return parser

@@ -169,6 +169,9 @@ class Bmfr(Section):
         4.0, 0.5, 1000, "[0.5;1000] largest distance between points of a history, in widths of a pixel on the surface"
     )
     normal_tolerance: float = param(0.1, 0, 4, "[0;4] largest squared distance between normals of a history")
+    follow_motion: bool = param(
+        True, doc="look for the history of what moves where it was, not where it is now", structural=True
+    )
     round_history: bool = param(True, doc="round the history's length before it is used", structural=True)
     alpha: float = param(0.2, 0, 1, "[0;1] smallest share of the new frame before the fit; 0: running mean")
     alpha_fit: float = param(0.1, 0, 1, "[0;1] smallest share of the new fit; 0: running mean")
@@ -200,6 +203,14 @@ class Bmfr(Section):
     caution: float = param(
         1.5, 0, 100, "[0;100] doubt in a part's own fit: variances that noise is expected to explain in each feature"
     )
+    short_history: int = param(
+        0,
+        0,
+        16,
+        "[0;16] frames: parts whose samples have fewer are doubted as fresh_caution says; 0: as all are",
+        structural=True,
+    )
+    fresh_caution: float = param(1.0, 0, 100, "[0;100] that doubt; less: smaller blocks where the history is short")
     unit_scale: bool = param(False, doc="scale positions to [0, 1] in every block, not to [-1, 1]", structural=True)
     regularization: str = param(
         "both",
@@ -416,6 +427,7 @@ PRESETS: dict[str, dict[str, dict[str, Value]]] = {
     "bmfr": {
         # Koskela et al. 2019: preprocessing, feature fitting, postprocessing.
         "paper": {
+            "follow_motion": False,
             "round_history": True,
             "alpha": 0.2,
             "alpha_fit": 0.1,
@@ -431,6 +443,7 @@ PRESETS: dict[str, dict[str, dict[str, Value]]] = {
         },
         # The authors' OpenCL code, where it differs from the paper.
         "reference": {
+            "follow_motion": False,
             "round_history": False,
             "alpha": 0.2,
             "alpha_fit": 0.1,

@@ -20,7 +20,7 @@ from gl.passes.spatial import SPATIAL, spatial
 from gl.passes.svgf import svgf
 from gl.passes.taa import taa
 from gl.passes.temporal import Guides, accumulate, reproject
-from raytrace.frame import STANDARD_BASIS, Basis, FramePacket
+from raytrace.frame import STANDARD_BASIS, STILL, Basis, CameraStep, FramePacket
 
 DENOISERS = {
     "none": "the noisy frame, one path per pixel",
@@ -43,6 +43,7 @@ SECTIONS_OF: dict[str, tuple[str, ...]] = {
     "none": (),
     "accumulate": ("svgf",),
     "svgf": ("svgf",),
+    "asvgf": ("asvgf",),
     "bmfr": ("bmfr",),
     **{denoiser: (denoiser.partition("-")[0], "spatial") for denoiser in SPATIAL},
     "reference": (),
@@ -56,7 +57,7 @@ class FrameTraits:
 
     ``moving``: objects move, so there is a ``frame.prev_normal``. ``specular``: something is metallic or glossy, so
     there are a ``frame.specular`` and a ``frame.specular_albedo``. ``pixel_size``: scene units a pixel is wide at depth
-    1. ``basis``, ``jitter``, ``index``: as in the :class:`FramePacket`. ``software``: the renderer
+    1. ``basis``, ``jitter``, ``index``, ``camera_step``: as in the :class:`FramePacket`. ``software``: the renderer
     runs on the CPU.
     """
 
@@ -67,6 +68,7 @@ class FrameTraits:
     index: int = 0
     software: bool = True
     specular: bool = False
+    camera_step: CameraStep | None = STILL
 
     @staticmethod
     def of(packet: FramePacket, software: bool = True) -> FrameTraits:
@@ -79,6 +81,7 @@ class FrameTraits:
             index=packet.index,
             software=software,
             specular=packet.specular is not None,
+            camera_step=packet.camera_step,
         )
 
 
@@ -189,7 +192,8 @@ def _bmfr(g: Graph, config: Config, traits: FrameTraits) -> Tex:
     if not traits.specular:  # one roughness for all: a second constant
         p = replace(p, features=",".join(name for name in p.features.split(",") if name != "roughness"))
     threads = thread_count(p.features, traits.software, part_count(p))
-    view = View(traits.basis, traits.jitter, traits.pixel_size, traits.index, threads)
+    step = None if p.follow_motion or not traits.moving else traits.camera_step
+    view = View(traits.basis, traits.jitter, traits.pixel_size, traits.index, threads, step)
     guides, features = Guides(g, traits.moving), named(albedo=s.albedo, roughness=s.specular_albedo)
     signals, albedos = {"direct": s.direct, "indirect": s.indirect}, s.albedos
     second: dict[str, Tex] = {}

@@ -23,6 +23,7 @@ SOURCES = (
     "directional_albedo",
     "embree_native",
     "embree_run",
+    "frame",
     "gradients",
     "guides",
     "kernels",

@@ -17,6 +17,13 @@ Basis = tuple[Vector, Vector, Vector]
 STANDARD_BASIS: Basis = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, -1.0))
 """Right, up and forward of a camera that looks along -z."""
 
+CameraStep = tuple[Basis, Vector]
+"""Rows of a rotation, and a shift, scene units, that together bring a point from a frame's camera space (right, up and
+forward of the camera) to that of the frame before."""
+
+STILL: CameraStep = (((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), (0.0, 0.0, 0.0))
+"""That of a camera that stands still."""
+
 MISS = -1.0
 """Object id of a pixel whose camera ray leaves the scene."""
 
@@ -67,6 +74,7 @@ class FramePacket:
     ``basis``: the camera's right, up and forward unit vectors, world space. The ray of pixel (x, y) goes along
     forward + pixel_size ((x + 1/2 + jitter_x - width / 2) right + (y + 1/2 + jitter_y - height / 2) up), and meets the
     surface, relative to the camera, at depth times that.
+    ``camera_step``: how the camera has moved; None: not known.
     ``timings``: seconds of wall time by stage name, of the tracer's own clock.
     """
 
@@ -91,6 +99,7 @@ class FramePacket:
     pixel_size: float = 0.0
     basis: Basis = STANDARD_BASIS
     jitter: tuple[float, float] = (0.0, 0.0)
+    camera_step: CameraStep | None = None
     timings: dict[str, float] = field(default_factory=dict)
 
     @property

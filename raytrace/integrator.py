@@ -360,7 +360,7 @@ class Tracer:
 
         embree = self.for_each_tile(tile, size, 4 if reshading is None else 4 * STRATUM)
         timings = {"trace": time.perf_counter() - start, "embree": embree}
-        packet = self._packet(index, now, size, signals, outputs, cut, camera, timings)
+        packet = self._packet(index, now, size, signals, outputs, cut, camera, previous_camera, timings)
         if reshading is None:
             return packet
         self._memory.keep(moment, reshading.points)
@@ -502,6 +502,7 @@ class Tracer:
         out: Outputs,
         cut: bool,
         camera: Camera,
+        previous_camera: Camera,
         timings: dict[str, float],
     ) -> FramePacket:
         width, height = size
@@ -521,5 +522,6 @@ class Tracer:
             basis=camera.axes(),
             jitter=camera.jitter,
             pixel_size=camera.pixel_size(height),
+            camera_step=camera.step_from(previous_camera),
             timings=timings,
         )

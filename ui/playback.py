@@ -84,7 +84,7 @@ class Reader:
         packet.timings["trace"] = time.perf_counter() - start
         if not self.hurry:
             time.sleep(min(max(self._due - time.perf_counter(), 0.0), 1.0 / FPS))
-        self._due = max(self._due, time.perf_counter() - 1.0 / FPS) + 1.0 / FPS
+        self._due = time.perf_counter() + 1.0 / FPS
         return packet
 
     def _packet(self, number: int, cut: bool) -> FramePacket:
@@ -159,7 +159,7 @@ class Playback:
         elif settled and self._settled and wanted[0] != self._settled[0]:
             self._shown = max(self._first, self._target - RUN_UP + 1)
             self._submit(cut=True)
-        elif not settled or state.reset or wanted != self._settled:
+        elif not settled or state.reset or state.screenshot or wanted != self._settled:
             self._again = True
         if settled:
             self._settled = wanted

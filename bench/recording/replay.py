@@ -25,6 +25,7 @@ from gl.context import create_headless
 from gl.profiler import Profiler
 from gl.renderer import Renderer, read
 from images import write_png
+from session import require_memory
 from storage import replace_file, require_writable
 
 
@@ -56,20 +57,21 @@ def selected(sequence: Sequence, frames: tuple[int | None, int | None]) -> range
     return range(first, end)
 
 
-def suited(sequence: Sequence, config: Config) -> Config:
-    """``config`` for the signals that the sequence has; tells on stderr what that changes."""
+def suited(sequence: Sequence, config: Config, denoiser: str) -> Config:
+    """``config`` for the signals that the sequence has; tells on stderr what that changes for ``denoiser``."""
     for notice in sequence.notices:
         print(notice, file=sys.stderr)
     if sequence.separate or not config.svgf.separate:
         return config
-    print(f"{sequence.name}: direct and indirect light are not told apart: SVGF filters their sum", file=sys.stderr)
+    if denoiser == "svgf":
+        print(f"{sequence.name}: direct and indirect light are not told apart: SVGF filters their sum", file=sys.stderr)
     return replace(config, svgf=replace(config.svgf, separate=False))
 
 
 def prepare(job: ReplayJob, config: Config) -> tuple[Sequence, range, Config]:
     """The sequence, the frames of it that are wanted, and the parameters that suit it. Raises UserError."""
     sequence = open_sequence(job.folder)
-    return sequence, selected(sequence, job.frames), suited(sequence, config)
+    return sequence, selected(sequence, job.frames), suited(sequence, config, job.denoiser)
 
 
 def run(job: ReplayJob, config: Config) -> None:
@@ -78,11 +80,15 @@ def run(job: ReplayJob, config: Config) -> None:
     if job.out.resolve() == job.folder.resolve():
         raise UserError(f"--out {job.out}: is the recording itself", "choose another folder")
     require_writable(job.out / "timings.json")
+    require_memory(sequence.size)
     scores = Scores(sequence.notes.get("references", {}))
     times: list[dict[str, Any]] = []
     with ExitStack() as stack:
         ctx = create_headless()
         stack.callback(ctx.release)
+        largest = ctx.info["GL_MAX_TEXTURE_SIZE"]
+        if max(sequence.size) > largest:
+            raise UserError(f"{sequence.folder}: {ctx.info['GL_RENDERER']} can draw {largest}x{largest} pixels at most")
         renderer = Renderer(ctx)
         stack.callback(renderer.release)
         with Progress(f"{sequence.name}: {job.denoiser}, {len(frames)} frames") as progress:

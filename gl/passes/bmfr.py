@@ -20,14 +20,14 @@ Deviations from the paper:
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 from config import Bmfr
 from gl.graph import ComputePass, FragmentPass, Graph, In, Out, Prev, Tex, Uniform
 from gl.passes.asvgf import LAMBDA
 from gl.passes.fast_history import FastHistory
 from gl.passes.temporal import Guides
-from raytrace.frame import Basis, Vector
+from raytrace.frame import Basis, CameraStep, Vector
 
 REPROJECTION = "xy: position in the last frame, texel units; z: mask of the 2x2 valid taps; w: history length N, frames"
 SAMPLES = "rgb: accumulated irradiance, finite; a: frames in it, 0 where there is none"
@@ -57,7 +57,7 @@ class View:
     """What a frame's camera and its renderer tell the filter besides textures.
 
     ``basis``, ``jitter``, ``pixel_size``, ``index``: as in the :class:`FramePacket`. ``threads``: invocations that work
-    on a block.
+    on a block. ``step``: how the camera has moved, where histories are to be looked for as if nothing else had.
     """
 
     basis: Basis
@@ -65,6 +65,7 @@ class View:
     pixel_size: float
     index: int
     threads: int
+    step: CameraStep | None = None
 
     @property
     def rows(self) -> tuple[Vector, ...]:
@@ -106,6 +107,17 @@ class AccumulateAdaptive(Accumulate):
     in_lambda = In(LAMBDA)
 
 
+class AccumulateInPlace(Accumulate):
+    """The same, but points are looked for where they are now, as the authors do: what moves finds another or none."""
+
+    u_turn = Uniform("mat3", "from this frame's camera space to the last frame's")
+    u_step = Uniform("vec3", "the same, added after that, scene units")
+
+
+class AccumulateInPlaceAdaptive(AccumulateInPlace, AccumulateAdaptive):
+    """Both."""
+
+
 class Samples(FragmentPass):
     """This frame's samples alone, in the form in which :class:`Accumulate` hands them on."""
 
@@ -134,6 +146,7 @@ class Fit(ComputePass):
     u_noise = Uniform("float", "[0;1] largest noise added to a feature")
     u_rank_tolerance = Uniform("float", "> 0, what of a feature is neglected, root of the mean square over the block")
     u_caution = Uniform("float", ">= 0, variances that noise is expected to explain in a feature of a part")
+    u_fresh_caution = Uniform("float", ">= 0, the same where the samples are means of few frames")
 
     def __init__(self, p: Bmfr, view: View) -> None:
         shift = OFFSETS[view.index % len(OFFSETS)]
@@ -145,6 +158,7 @@ class Fit(ComputePass):
                 "NOISE": int(p.regularization != "rank"),
                 "UNIT": int(p.unit_scale),
                 **({"PARTS": part_count(p), "PART": p.part_side} if p.part_side else {}),
+                **({"FRESH": p.short_history} if p.part_side and p.short_history else {}),
             },
             u_view=view.rows,
             u_jitter=view.jitter,
@@ -153,6 +167,7 @@ class Fit(ComputePass):
             u_noise=p.noise,
             u_rank_tolerance=1e-7 if p.regularization == "noise" else p.rank_tolerance,
             u_caution=p.caution,
+            u_fresh_caution=p.fresh_caution,
         )
 
     def work_groups(self, size: tuple[int, int]) -> tuple[int, int]:
@@ -215,7 +230,7 @@ def thread_count(features: str, software: bool, parts: int = 0) -> int:
 def shared_bytes(features: int, threads: int, parts: int = 0) -> int:
     """Shared memory of ``bmfr/fit.comp``: half of the triangles and all of the parts', bounds of position, weights."""
     slots = max(threads // 2, 1) + parts
-    triangle = features * (features + 7) // 2 + (1 if parts else 0)
+    triangle = features * (features + 7) // 2 + (2 if parts else 0)
     return 4 * triangle * slots + 2 * 16 * threads + 16 * features * (1 + parts)
 
 
@@ -238,6 +253,9 @@ def bmfr(
     inputs = {f"in_{name}": noisy for name, noisy in signals.items()}
     names = name if p.demodulate else f"{name}.radiance"
     extra = {} if change is None else {"in_lambda": change}
+    work = _ACCUMULATIONS[view.step is not None, change is not None]
+    moved: dict[str, Any] = {} if view.step is None else {"u_turn": view.step[0], "u_step": view.step[1]}
+    before = guides.optional if view.step is None else {}
     adaptive = {} if change is None else {"ADAPTIVE": 1}
     with g.scope(name):
         if not p.temporal:
@@ -245,14 +263,15 @@ def bmfr(
             return _fit(g, samples, features, guides, p, view) if p.fit else samples
         noisy, guide = g.history(f"{names}.noisy", "rgba16f"), g.history(f"{names}.guide", "rg32f")
         found = g.add(
-            (Accumulate if change is None else AccumulateAdaptive)(
+            work(
                 u_view=view.rows,
                 u_pixel_size=view.pixel_size,
                 u_alpha=p.alpha,
                 u_max_history=float(p.max_history),
                 u_position_tolerance=p.position_tolerance,
                 u_normal_tolerance=p.normal_tolerance,
-                defines={"ROUND_HISTORY": int(p.round_history), **adaptive},
+                defines={"ROUND_HISTORY": int(p.round_history), **adaptive, **({"IN_PLACE": 1} if moved else {})},
+                **moved,
             ),
             "accumulate",
             in_motion=guides.motion,
@@ -260,7 +279,7 @@ def bmfr(
             prev_color=noisy,
             prev_guide=guide,
             **inputs,
-            **guides.optional,
+            **before,
             **extra,
         )
         accumulated, fast = found.out_color, None
@@ -284,6 +303,15 @@ def bmfr(
             clean = fast.bound(clean)
         g.feed(fitted, clean)
         return clean
+
+
+_ACCUMULATIONS: Final[dict[tuple[bool, bool], type[Accumulate]]] = {
+    (False, False): Accumulate,
+    (False, True): AccumulateAdaptive,
+    (True, False): AccumulateInPlace,
+    (True, True): AccumulateInPlaceAdaptive,
+}
+"""By whether what moves is looked for where it is now, and whether light is known to have changed."""
 
 
 def _fit(g: Graph, samples: Tex, features: dict[str, Tex], guides: Guides, p: Bmfr, view: View) -> Tex:

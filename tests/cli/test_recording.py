@@ -126,7 +126,6 @@ def test_frames_of_another_program(app: App, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ("record", "the following arguments are required: --out\n  see: app.py record --help"),
         ("record --out {} --frames 0", "--frames 0: must be a whole number in [1;1000000]"),
         ("record --out {} --reference-spp 0", "--reference-spp 0: must be a whole number"),
         ("record --out {} --scene cornel", "did you mean 'cornell'?"),

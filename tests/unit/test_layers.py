@@ -44,7 +44,7 @@ LAYERS = [
     layer("assets", "assets raytrace errors", OPENGL | EMBREE | WINDOWS),
     layer("raytrace", "raytrace config errors", OPENGL | WINDOWS),
     layer("gl", "gl raytrace.frame config parameter errors", EMBREE | WINDOWS),
-    layer("ui", "ui assets bench.judge gl raytrace config parameter console errors images session", EMBREE),
+    layer("ui", "ui assets bench.judge gl raytrace config parameter console errors images session storage", EMBREE),
     layer(
         "bench",
         "assets bench gl raytrace config parameter console errors images session storage",

@@ -65,6 +65,7 @@ CASES: dict[str, tuple[Config, str, FrameTraits]] = {
     "bmfr_without_either": (load(None, ("bmfr.temporal=false", "bmfr.fit=false")), "bmfr", FrameTraits()),
     "bmfr_without_demodulation": (load(None, ("bmfr.demodulate=false",)), "bmfr", FrameTraits()),
     "bmfr_moving": (Config(), "bmfr", FrameTraits(moving=True)),
+    "bmfr_paper_moving": (load(None, ("bmfr.preset=paper",)), "bmfr", FrameTraits(moving=True)),
     "bmfr_on_hardware": (Config(), "bmfr", FrameTraits(software=False)),
     "none_glossy": (Config(), "none", GLOSSY),
     "accumulate_glossy": (Config(), "accumulate", GLOSSY),

@@ -15,6 +15,7 @@ from bench.recording.sequence import Sequence, open_sequence
 from bench.recording.view import View, matrix_of
 from raytrace.camera import Camera
 from raytrace.frame import FramePacket
+from tests.unit.documents import table
 from tests.unit.recordings import EYE, SIZE, foreign, opened, recorded
 
 FRAMES = 3
@@ -71,6 +72,14 @@ def test_every_image_of_a_packet_is_recorded_or_derived() -> None:
     left_out = {"position", "prev_position"}  # of no use to the filters
     images = {field.name for field in fields(FramePacket) if "F32" in str(field.type)}
     assert stored | derived | left_out == images
+
+
+def test_the_table_in_the_documentation_is_that_of_the_program() -> None:
+    rows = table("docs/recording.md", "What is in the folder")
+    assert rows == [
+        [f"`{image.name}`", str(image.channels), "yes" if image.required else "no", image.meaning]
+        for image in IMAGES.values()
+    ]
 
 
 def test_depth_is_derived_where_it_is_not_there(tmp_path: Path) -> None:

@@ -98,7 +98,7 @@ def test_references_converge_go_on_and_know_their_noise(tmp_path: Path, monkeypa
     reference = Tracer.reference
 
     def counting(tracer: Tracer, *arguments: Any) -> Any:
-        if len(traced) == 5:
+        if len(traced) == 8:
             raise StoppedError
         traced.append((arguments[4], arguments[2]))  # first sample, count
         return reference(tracer, *arguments)
@@ -109,7 +109,7 @@ def test_references_converge_go_on_and_know_their_noise(tmp_path: Path, monkeypa
         with pytest.raises(StoppedError):
             converge.run(reopened(tmp_path, shot), shot, 3, False, 32)
         # One round over all frames before the next, so that all are about equally good when it stops.
-        assert traced == [(0, 8), (0, 8), (0, 8), (8, 8), (8, 8)]
+        assert traced == [(0, 4), (4, 4)] * 3 + [(8, 4), (12, 4)]
         assert open_sequence(tmp_path).references == {0, 1, 2}
         monkeypatch.setattr(Tracer, "reference", reference)
         converge.run(reopened(tmp_path, shot), shot, 3, False, 32)
@@ -132,8 +132,29 @@ def test_references_that_are_there_cost_nothing(tmp_path: Path, monkeypatch: pyt
     with opened(animate=False) as shot:
         recorded(tmp_path, shot, 1)
         converge.run(reopened(tmp_path, shot), shot, 1, False, 4)
+        before = (tmp_path / "reference0.exr").read_bytes()
         monkeypatch.setattr(Tracer, "reference", None)
         converge.run(reopened(tmp_path, shot), shot, 1, False, 2)
+        (tmp_path / "reference0.exr").unlink()  # as after the power failed
+        converge.run(reopened(tmp_path, shot), shot, 1, False, 4)
+        assert (tmp_path / "reference0.exr").read_bytes() == before
+        converge.sums_path(tmp_path, 0).unlink()
+        converge.run(reopened(tmp_path, shot), shot, 1, False, 4)
+
+
+def test_references_whose_sums_were_removed_begin_anew(tmp_path: Path) -> None:
+    with opened(animate=False) as shot:
+        recorded(tmp_path, shot, 1)
+        converge.run(reopened(tmp_path, shot), shot, 1, False, 4)
+        converge.sums_path(tmp_path, 0).unlink()
+        converge.run(reopened(tmp_path, shot), shot, 1, False, 6)
+        means = shot.reference(0, 6)
+    sequence = open_sequence(tmp_path)
+    assert sequence.notes["references"]["0"]["samples"] == 6
+    packet, got = sequence.packet(0), sequence.reference(0)
+    assert got is not None
+    expected = (means[0] + means[1]) * packet.albedo[..., :3] + packet.emission[..., :3]
+    np.testing.assert_allclose(got, expected, rtol=1e-5, atol=1e-6)
 
 
 def test_the_window_s_recorder_writes_what_it_is_given(tmp_path: Path) -> None:

@@ -46,7 +46,7 @@ def stage() -> Iterator[Stage]:
     def camera(frame: int) -> Camera:
         return Camera((float(frame), 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0), 1.0)
 
-    scene = SimpleNamespace(scene=SimpleNamespace(name="room"), extent=8.0, has_motion=True)
+    scene = SimpleNamespace(scene=SimpleNamespace(name="room", dims=False), extent=8.0, moves=True)
     shot: Any = SimpleNamespace(scene=scene, camera=camera, tracer=Notes())
     made = Stage(shot, True, lambda: None)
     yield made

@@ -4,6 +4,7 @@ screen, or in the passes that the frame runs through.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 
 import assets
+from bench.recording.sequence import open_sequence
 from raytrace.camera_path import read_keyframes
 from raytrace.shot import FPS
 from tests.window.desktop import F32, START_SECONDS, STILL, App, application, difference, plan, roughness, wait_for
@@ -322,6 +324,26 @@ def fast(app: App) -> None:
     assert start - place(app.settled())[0] > 1.5 * slow > 0.0
 
 
+def recording(app: App) -> None:
+    """The frames shown, in their size and in order, from the key to the key."""
+    folder = Path(app.ask("F11", r"recording to (\S+)$")[1])
+    wait_for(lambda: (folder / "world_position3.exr").exists(), "four recorded frames")
+    told = app.ask("F11", r"recorded (\d+) frames to (\S+)$")
+    app.hear(rf"^{re.escape(str(folder))}$")
+    sequence = open_sequence(folder)
+    assert (sequence.frames, str(folder)) == (int(told[1]), told[2])
+    assert sequence.size == (160, 90)
+    assert sequence.notes["about"]["scene"] == "cornell"
+    first, last = sequence.packet(0), sequence.packet(sequence.frames - 1)
+    assert not np.array_equal(first.direct, last.direct)
+    assert (last.motion[..., :2] == 0.0).all()  # the camera is at rest
+    assert first.jitter != last.jitter  # but for what the anti-aliasing wants
+    since = len(app.stdout())
+    app.press("0")
+    app.hear("noisy frame", since)
+    assert not (folder / f"color{sequence.frames}.exr").exists()
+
+
 def error_map(app: App) -> None:
     before = app.settled()
     app.ask("m", "error map on$")
@@ -367,6 +389,7 @@ CHECKS: dict[str, Callable[[App], None]] = {
     "MINUS": resolution("minus", "equal", (120, 68)),
     "G": overlay("g", "hud"),
     "K": overlay("k", "help"),
+    "F11": recording,
     "F12": screenshot,
     "ESCAPE": let_go,
     "W": flight("w", moved=2, sign=1),

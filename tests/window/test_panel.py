@@ -316,6 +316,7 @@ def test_textures_are_chosen_from_a_list(hand):
         (Action.RESET_HISTORY, "reset", "by key"),
         (Action.RESET_CAMERA, "home", True),
         (Action.SCREENSHOT, "screenshot", True),
+        (Action.RECORD, "recording", True),
     ],
 )
 def test_buttons_do_what_their_keys_do(hand, action, field, value):

@@ -2,7 +2,8 @@
 //
 // One work group per block of GROUP_X x GROUP_Y pixels. X_AT: place of feature X's first component in a row; what is not
 // in the list of features is neither computed nor read. NOISE: stochastic regularisation. UNIT: scale to [0, 1]. PARTS: of
-// the block, PART pixels wide, that are fitted again; not defined if there are none.
+// the block, PART pixels wide, that are fitted again; not defined if there are none. FRESH: of fewer frames a part is judged
+// by another caution; not defined if of none.
 
 layout(local_size_x = THREADS) in;
 
@@ -26,6 +27,7 @@ uniform uint u_seed;
 uniform float u_noise;
 uniform float u_rank_tolerance;
 uniform float u_caution;
+uniform float u_fresh_caution;
 
 layout(rgba16f, binding = 0) writeonly uniform image2D out_color;
 
@@ -166,6 +168,9 @@ void fold_pixel(int element, uint seed) {
     bool counts = is_surface(surface, place) && color.a > 0.0;
     EACH(SELECT)
     for (int k = FEATURES; k < COLUMNS; ++k) row[k] = counts ? row[k] : 0.0;
+#ifdef FRESH
+    age += counts ? color.a : 0.0;
+#endif
     fold_row();
 }
 
@@ -234,7 +239,7 @@ void main() {
     if (thread == 0) solve(u_rank_tolerance);
     barrier();
 #if PARTS
-    for (int part = thread; part < PARTS; part += THREADS) solve_part(part, u_rank_tolerance, u_caution);
+    for (int part = thread; part < PARTS; part += THREADS) solve_part(part, u_rank_tolerance, u_caution, u_fresh_caution);
     barrier();
 #endif
     for (int piece = thread % PIECES; piece < PIECES; piece += THREADS) write_piece(piece, thread / PIECES);

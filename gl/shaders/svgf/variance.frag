@@ -103,9 +103,8 @@ void main() {
         e = gloss.r + gloss.g + gloss.b > 0.0 ? e : 1e30; // where nothing shines there is no light to tell of
 #endif
         float w = sane_weight(n * exp(-e));
-        sum += w * vec3(moments_at(q), 1.0);
-#ifdef PREFILTER
-        colors += w * color_at(q).rgb;
+#if !HAS_IN_MOMENTS
+        w = sample_at(q).a < 0.0 ? 0.0 : w;
 #endif
         sum += w * vec3(moments_at(q), 1.0);
         colors += w * color_at(q).rgb;
