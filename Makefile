@@ -15,6 +15,7 @@ test: lint  ## lint, types, every test
 bench:      ## the measured table of the README
 	@$(PYTHON) tools/setup.py run
 	$(VENV) app.py bench --table $(ARGS)
+	$(VENV) -m bench.features
 
 lint:
 	@$(PYTHON) tools/setup.py test
