@@ -148,13 +148,14 @@ class Settings:
 class Tracer:
     """Traces one compiled scene. ``with Tracer(...)`` or :meth:`close` ends its threads.
 
-    ``images``: names of those its frames have. ``scene_id``: their number, which no other tracer of this process gives.
+    ``variant``: what is compiled in, if that is to be more than the scene needs. ``images``: names of those its frames
+    have. ``scene_id``: their number, which no other tracer of this process gives.
     """
 
-    def __init__(self, scene: CompiledScene, settings: Settings | None = None) -> None:
+    def __init__(self, scene: CompiledScene, settings: Settings | None = None, variant: Variant | None = None) -> None:
         self.scene = scene
         self.settings = settings or Settings()
-        self.variant: Variant = variant_of(scene)
+        self.variant: Variant = variant or variant_of(scene)
         self.images = images_of(self.variant, self.settings.positions)
         self.scene_id = next(_identities)
         self.rays = open_caster(scene.triangles, scene.static_count, self.settings.backend)
