@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from raytrace import kernels, kernels_glossy
 from raytrace.camera import Camera
-from raytrace.compiled import OBJECT, CompiledScene
+from raytrace.compiled import CompiledScene
 from raytrace.embree import open_caster
 from raytrace.features import ILLUMINATION, images_of
 from raytrace.frame import FramePacket
@@ -126,7 +126,8 @@ class Settings:
     """How frames are traced. ``generator``: HALTON or HASH; ``threads`` 0 = one per core; ``tile`` pixels per tile;
     ``positions``: frames carry world positions; ``backend``: see :func:`raytrace.embree.open_caster`; ``regularize``:
     narrow lobes are widened at a path's second hit, never in references; ``separable``: Smith's masking in its older,
-    separable form, as some renderers have it."""
+    separable form, as some renderers have it; ``also``: features (fields of :class:`Variant`) compiled in although the
+    scene lacks them, to measure what that costs."""
 
     seed: int = 0
     generator: int = HALTON
@@ -136,6 +137,7 @@ class Settings:
     backend: str = "auto"
     regularize: bool = True
     separable: bool = False
+    also: tuple[str, ...] = ()
 
 
 class Tracer:
@@ -147,7 +149,7 @@ class Tracer:
     def __init__(self, scene: CompiledScene, settings: Settings | None = None) -> None:
         self.scene = scene
         self.settings = settings or Settings()
-        self.variant: Variant = variant_of(scene)
+        self.variant: Variant = variant_of(scene)._replace(**dict.fromkeys(self.settings.also, True))
         self.images = images_of(self.variant, self.settings.positions)
         self.scene_id = next(_identities)
         self.rays = open_caster(scene.triangles, scene.static_count, self.settings.backend)
@@ -212,8 +214,8 @@ class Tracer:
             triangle, u, v = self.rays.intersect_rows(origins, directions, view.size[0])
         else:
             triangle, u, v = self.rays.intersect(origins, directions)
-        # Index -1 of a miss picks some object; it is overwritten where that matters.
-        objects = np.where(triangle >= 0, self.scene.triangle_info[triangle, OBJECT], np.int32(-1))
+        objects = np.empty(count, np.int32)
+        kernels.objects_of(triangle, self.scene.triangle_info, objects)
         return Hits(triangle, u, v, objects), directions
 
     def shade(
@@ -244,8 +246,8 @@ class Tracer:
         s = self._scratch
         s.reserve(count)
         settings = self.settings
-        direct[:, :3] = 0.0
-        indirect[:, :3] = 0.0
+        kernels.clear(direct)
+        kernels.clear(indirect)
         shadows, bounces = self._first_hit(
             self.tables, hits.triangle, hits.u, hits.v, eye, seeds.pixel, seeds.frame, settings.seed,
             settings.generator, s.shadow_o, s.shadow_d, s.index, s.light, s.bounce_o, s.bounce_d, s.bounce_index,
@@ -270,7 +272,7 @@ class Tracer:
         s.reserve(count)
         s.reserve_glossy(count)
         for image in (direct, indirect, specular):
-            image[:, :3] = 0.0
+            kernels.clear(image)
         shadows, bounces = self._first_hit(
             self.tables, hits.triangle, hits.u, hits.v, eye, np.float32(pixel), seeds.pixel, seeds.frame,
             settings.seed, settings.generator, s.shadow_o, s.shadow_d, s.index, s.light, s.gloss, s.bounce_o,

@@ -126,6 +126,16 @@ def test_everything_is_counted() -> None:
     assert 0.0 < content.sky_share <= 0.5
 
 
+def test_a_feature_that_is_compiled_in_for_nothing_changes_no_bit() -> None:
+    scene = compile_scene(cornell())
+    with Tracer(scene) as plain, Tracer(scene, Settings(also=("sky",))) as more:
+        assert (plain.variant.sky, more.variant.sky) == (False, True)
+        camera = scene.scene.camera
+        one, other = (tracer.frame(3, camera, camera, SIZE) for tracer in (plain, more))
+    for name in plain.images:
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+
+
 def test_files_of_one_name_are_two_scenes(tmp_path: Path) -> None:
     """Opened one after the other, the second must not go on with what was accumulated of the first."""
     packets = []
