@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
@@ -21,9 +23,13 @@ def test_terrains_have_about_as_many_triangles_as_asked_for(count: int) -> None:
 
 def test_all_are_called_in_turn_and_the_first_two_calls_do_not_count() -> None:
     calls: list[tuple[str, int]] = []
-    found = medians({name: lambda index, name=name: calls.append((name, index)) for name in "ab"}, 2)
+
+    def note(name: str) -> Callable[[int], None]:
+        return lambda index: calls.append((name, index))
+
+    found = medians({name: note(name) for name in "ab"}, 2)
     assert calls == [(name, index) for index in range(4) for name in "ab"]
-    assert all(0.0 <= processor and 0.0 <= wall < 50.0 for wall, processor in found.values())
+    assert all(processor >= 0.0 and 0.0 <= wall < 50.0 for wall, processor in found.values())
 
 
 def test_rows_are_relative_to_what_they_say() -> None:
