@@ -72,12 +72,10 @@ class Atrous(FragmentPass):
     u_pixel_size = Uniform("float", "> 0, scene units a pixel is wide at depth 1")
 
     def __init__(self, p: Svgf, step: int, pixel_size: float, raw: bool = False) -> None:
-        # A power of two is squared into place: pow() costs more than seven products.
-        squarings = p.sigma_n.bit_length() - 1
         super().__init__(
             defines={
                 "STEP": step,
-                "SIGMA_N_SQUARINGS": squarings if p.sigma_n == 1 << squarings else -1,
+                "SIGMA_N_SQUARINGS": squarings(p.sigma_n),
                 "LUMINANCE_STOP": int(p.variance_guided),
                 "RAW": int(raw),
             },
@@ -87,6 +85,12 @@ class Atrous(FragmentPass):
             u_sigma_l=p.sigma_l * (p.first_sigma_l if step == 1 else 1.0),
             u_pixel_size=pixel_size,
         )
+
+
+def squarings(exponent: int) -> int:
+    """log2 of a power of two, -1 of any other number: squaring that often costs less than pow()."""
+    count = exponent.bit_length() - 1
+    return count if exponent == 1 << count else -1
 
 
 def svgf(

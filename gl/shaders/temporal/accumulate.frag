@@ -1,9 +1,10 @@
 // Blend this frame's sample with the history found by temporal/reproject.frag, and the luminance moments with it.
 //
 // Schied et al. 2017, sec. 4.1 and 4.2: C' = a·C + (1 - a)·C'_prev, moments likewise. HALF: the colour's precision.
-// CLAMPED: the history's colour is first brought within the bounds of temporal/neighbourhood.frag. ADAPTIVE: where light
-// has changed, the history counts for less (Schied et al. 2018, sec. 4.4); SIGNAL: which channel of λ tells it; POWER: its
-// length becomes N (1 - λ)^u_power, otherwise that of a mean in which the new sample has the weight it gets.
+// CLAMPED: the history's colour is first brought within the bounds of temporal/neighbourhood.frag. ADAPTIVE: where
+// light has changed, the history follows it and counts for less (Schied et al. 2018, sec. 4.4); SIGNAL: which channel
+// of λ tells it; POWER: its length becomes N (1 - λ)^u_power, otherwise that of a mean in which the new sample has the
+// weight it gets.
 
 #include "common/color.glsl"
 #include "common/finite.glsl"
@@ -11,13 +12,13 @@
 uniform sampler2D in_color;
 uniform sampler2D in_reprojection;
 uniform sampler2D prev_color;   // rgb, standard deviation
-uniform sampler2D prev_moments; // first and second luminance moment; ADAPTIVE: z: part of the history's length that was left
+uniform sampler2D prev_moments; // first and second luminance moment; z: what was left of the length, if ADAPTIVE
 #ifdef CLAMPED
 uniform sampler2D in_low;
 uniform sampler2D in_high;
 #endif
 #ifdef ADAPTIVE
-uniform sampler2D in_lambda;
+uniform sampler2D in_lambda; // xy: λ of direct and indirect light; zw: factors by which they have changed
 uniform float u_power;
 #endif
 uniform bool u_history_valid;
