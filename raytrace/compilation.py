@@ -21,6 +21,7 @@ SOURCES = (
     "compiled",
     "embree_native",
     "embree_run",
+    "frame",
     "gradients",
     "guides",
     "kernels",

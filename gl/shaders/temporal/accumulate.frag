@@ -95,7 +95,7 @@ void main() {
         void_share = clamp(change[SIGNAL], 0.0, 1.0);
         // What was seen in other light, as it would be in this one.
         float factor = change[2 + SIGNAL];
-        color *= factor;
+        color = clamp_radiance(color * factor);
         moments *= vec2(factor, factor * factor);
 #if POWER
         n *= pow(max(1.0 - void_share, 1e-9), u_power); // pow(0, 0) is undefined
