@@ -42,7 +42,7 @@ class Scores:
     def __init__(self, notes: Mapping[str, Any]) -> None:
         self._notes = notes
         self.rows: list[dict[str, Any]] = []
-        self._last: tuple[int, F32, F32, Mask] | None = None
+        self._last: tuple[int, dict[str, F32], F32, Mask] | None = None
 
     def add(self, packet: FramePacket, image: F32, reference: F32) -> None:
         """``image`` (H, W, 3): the method's radiance of the frame ``packet``; ``reference``: what it should be."""
@@ -51,17 +51,17 @@ class Scores:
         self.rows.append(row)
         if not mask.any():
             return
-        row["errors"] = measure(image, reference, mask)
-        row["noisy"] = measure(packet.radiance(), reference, mask)
+        images = {"errors": image, "noisy": packet.radiance()}
+        row |= {kind: measure(one, reference, mask) for kind, one in images.items()}
         row["of_reference"] = dict(note.get("floors", {}))
         if self._last is not None and self._last[0] == packet.index - 1:
-            _, before, reference_before, mask_before = self._last
-            both = mask & mask_before
-            if both.any():
-                row["errors"]["temporal"] = temporal_difference(image, before, reference, reference_before, both)
+            _, before, expected, mask_before = self._last
+            if (both := mask & mask_before).any():
+                for kind, one in images.items():
+                    row[kind]["temporal"] = temporal_difference(one, before[kind], reference, expected, both)
                 row["of_reference"]["temporal"] = note.get("temporal_noise")
         row["means_something"] = meaning(row["errors"], row["of_reference"])
-        self._last = packet.index, image, reference, mask
+        self._last = packet.index, images, reference, mask
 
     def summary(self) -> dict[str, Any]:
         """Of all frames: RMSE pooled, PSNR of the mean of the mean squares, the others' means."""

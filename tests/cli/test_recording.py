@@ -87,7 +87,7 @@ def test_what_a_replay_writes(app: App, tmp_path: Path, folder: Path) -> None:
         assert 0.0 < floor[name] < errors[name] < 0.8 * noisy[name]
     for name in ("psnr", "ssim"):
         assert floor[name] > errors[name] > noisy[name]
-    assert 0.0 < floor["temporal"] < errors["temporal"]
+    assert 0.0 < floor["temporal"] < errors["temporal"] < noisy["temporal"]
     assert metrics["summary"]["means_something"] == dict.fromkeys(errors, True)
     assert [row["reference_samples"] for row in metrics["frames"]] == [16] * 4
     assert "temporal" not in metrics["frames"][0]["errors"]

@@ -186,6 +186,43 @@ def test_half_precision_will_do(tmp_path: Path, names: tuple[str, ...]) -> None:
     assert np.abs(rough.motion[hit][:, :2]).max() == 0.0
 
 
+def test_an_object_of_number_minus_one_is_a_miss(tmp_path: Path) -> None:
+    foreign(tmp_path, frames=1)
+    before = open_sequence(tmp_path).packet(0)
+    ids = np.full((12, 20, 1), 3.0, np.float32)
+    ids[:2] = -1.0
+    assert (before.motion[:2, :, 3] == 0.0).all()
+    exr.write(tmp_path / "object_id0.exr", ids)
+    packet = open_sequence(tmp_path).packet(0)
+    assert (packet.motion[:2, :, 3] == -1.0).all()
+    assert (packet.surface[:2] == 0.0).all()
+    assert (packet.albedo[:2] == 0.0).all()
+    assert set(np.unique(packet.motion[2:, :, 3])) == {-1.0, 3.0}
+
+
+def test_a_point_that_was_behind_the_camera_is_found_nowhere(tmp_path: Path) -> None:
+    """Its projection lies in the picture, upside down: a history must not be taken from there."""
+    foreign(tmp_path)
+    for index in range(3):
+        images = exr.read(tmp_path / f"world_position{index}.exr", 3)
+        behind = 2.0 * np.asarray(EYE.position, dtype=np.float32) - images
+        exr.write(tmp_path / f"prev_position{index}.exr", behind)
+    packet = open_sequence(tmp_path).packet(1)
+    hit = packet.motion[..., 3] >= 0.0
+    assert (packet.motion[hit][:, :2] == 2.0).all()
+    assert (packet.motion[hit][:, 2] <= 0.0).all()
+
+
+def test_a_cut_moves_nothing(tmp_path: Path) -> None:
+    with opened() as shot:
+        recorded(tmp_path, shot, 2)
+    sequence = without(tmp_path, "prev_position", "prev_normal")
+    assert np.abs(sequence.packet(1).motion[..., :2]).max() > 1e-4
+    packet = sequence.packet(1, cut=True)
+    assert packet.cut
+    assert (packet.motion[..., :2] == 0.0).all()
+
+
 def test_normals_need_not_have_length_one(tmp_path: Path) -> None:
     foreign(tmp_path, frames=1)
     exact = open_sequence(tmp_path).packet(0)
