@@ -106,7 +106,10 @@ def _add_denoiser(parser: Parser, known: Sequence[str], text: str) -> None:
 
 def _add_scene(parser: Parser) -> None:
     parser.add_argument(
-        "--scene", default="cornell", metavar="S", help=f"cornell, interior, or a file: {SCENE_FILES} (default cornell)"
+        "--scene",
+        default="cornell",
+        metavar="S",
+        help=f"one of app.py scenes, or a file: {SCENE_FILES} (default cornell)",
     )
     _add_environment(parser)
 

@@ -110,6 +110,9 @@ class Svgf(Section):
     sigma_l: float = param(4.0, 0.01, 1000, "[0.01;1000] tolerance for luminance, in standard deviations of the noise")
     first_sigma_l: float = param(4.0, 0.1, 1000, "[0.1;1000] sigma_l of the first iteration, in sigma_l of the others")
     sigma_r: float = param(0.1, 0.001, 100, "[0.001;100] tolerance for roughness, of specular light only")
+    reach: float = param(
+        100.0, 1, 1e6, "[1;1000000] distance over which specular light is averaged, pixels per squared roughness"
+    )
 
     @property
     def feedback(self) -> int:
@@ -181,8 +184,9 @@ class Bmfr(Section):
     fast_frames: int = param(6, 1, 32, "[1;32] those last frames")
     fast_sigma: float = param(2.0, 0, 10, "[0;10] reach of that bound, in their standard deviations")
     adaptive: bool = param(
-        False, doc="cut both histories where light has changed, as A-SVGF does, by its parameters", structural=True
+        False, doc="cut both histories where light has changed, by A-SVGF's gradients and parameters", structural=True
     )
+    gain: float = param(3.0, 0, 1000, "[0;1000] asvgf.gain of these histories, which are longer than A-SVGF's")
     fit: bool = param(
         True, doc="fit blocks by features; off: what was accumulated before", structural=True, heading="regression"
     )

@@ -21,6 +21,7 @@ from gl.upload import PREFIX
 from parameter import Value
 from raytrace.compiled import CompiledScene
 from raytrace.features import GRADIENT, compiled_in, content_of, images_of, rays_of
+from raytrace.frame import STRATUM
 from raytrace.integrator import Tracer
 from raytrace.scene import Scene
 from session import find_scene, prepare_tracer, tell_notices
@@ -33,6 +34,10 @@ WORDS: Final = {
     "moving": "moving objects",
     "lamps": "lamps",
     "specular": "metals and gloss",
+    "glossmap": "textures of roughness or metal",
+    "bumps": "normal maps",
+    "colored": "colours of vertices",
+    "cutout": "cut-outs",
     "separable": "separable masking",
     "punctual": "lights without a surface",
     "environment": "an environment",
@@ -162,6 +167,9 @@ def tracer_section(subject: Subject) -> list[str]:
         rows += [("kernel", _name(kernel), first), *(("", "", line) for line in more)]
     scenes = "two scenes, that of what moves built anew every frame" if tracer.variant.moving else "one scene"
     rows.append(("Embree", tracer.rays.name, scenes))
+    rule = remembered(config, subject.denoiser)
+    place = f"1 in {STRATUM}x{STRATUM} pixels, {rule}; no ray more"
+    rows.append(("sample", "carried over", place if rule else "none: the method does not ask for any"))
     wish = f"render.jitter = {_value(config.render.jitter)}"
     state = State(config, subject.denoiser)
     headless = subject.jitter or config.render.jitter == "on"

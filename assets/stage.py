@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -37,11 +38,25 @@ class Stage:
         self._textures.append(Texture(name, pixels))
         return len(self._textures) - 1
 
-    def material(self, name: str, color: Colour, texture: int = -1, emission: Colour = (0.0, 0.0, 0.0)) -> None:
-        """Add a material under a name of its own. ``color`` is linear and multiplies the texture."""
+    def material(
+        self,
+        name: str,
+        color: Colour,
+        texture: int = -1,
+        emission: Colour = (0.0, 0.0, 0.0),
+        roughness: float | None = None,
+        metallic: float = 0.0,
+    ) -> None:
+        """Add a material under a name of its own. ``color`` is linear and multiplies the texture.
+
+        Without a ``roughness`` it is diffuse, with one glossy, or a metal.
+        """
         if name in self._materials:
             raise ValueError(f"there is a material {name!r} already")
-        self._materials[name] = Material(name, color, texture, emission)
+        material = Material(name, color, texture, emission)
+        if roughness is not None:
+            material = replace(material, specular=True, roughness=roughness, metallic=metallic)
+        self._materials[name] = material
 
     def add(self, name: str, parts: list[Part], motion: Motion | None = None) -> None:
         """Add one object. With ``motion`` its shapes are in the object's own space, otherwise in the world's."""

@@ -41,6 +41,10 @@ class Film:
     scored: tuple[int, ...]
     camera: str = "still"
 
+    def first(self, frames: int) -> Film:
+        """The film's beginning, all of it if it is no longer."""
+        return replace(self, frames=min(frames, self.frames), scored=tuple(i for i in self.scored if i < frames))
+
     def open(self, config: Config, size: tuple[int, int]) -> Shot:
         """The shot in pictures of ``size``. Its tracer is the caller's to close."""
         sized = replace(config, render=replace(config.render, width=size[0], height=size[1]))
@@ -157,10 +161,10 @@ def play(
 
 
 def compare(
-    footage: Footage, methods: Sequence[Method], config: Config, new_renderer: NewRenderer
+    footage: Footage, methods: Sequence[tuple[Method, Config]], new_renderer: NewRenderer
 ) -> tuple[Outcome, ...]:
-    """All ``methods``, of which the first must be the noisy frame itself: the ratios are to it."""
-    outcomes = [play(footage, method, config, new_renderer) for method in methods]
+    """All ``methods``, each with its parameters; the first must be the noisy frame itself, the ratios are to it."""
+    outcomes = [play(footage, method, config, new_renderer) for method, config in methods]
     noisy = outcomes[0]
     return tuple(
         replace(o, rmse_ratio=o.rmse / noisy.rmse, temporal_ratio=o.temporal / noisy.temporal) for o in outcomes

@@ -4,11 +4,15 @@ glTF 2.0, appendix B.2: a dielectric is a diffuse base under a specular lobe of 
 alone, coloured; what is neither is their linear mix. The lobe is GGX with Smith's masking and Schlick's Fresnel term
 (Walter et al. 2007; Heitz 2014, "Understanding the Masking-Shadowing Function"; Schlick 1994):
 
-    specular = F D V,   diffuse = (1 - metallic) (1 - F_dielectric) base / pi,   F = F0 + (1 - F0) (1 - v·h)^5
+    specular = F D V,   diffuse = (1 - metallic) (1 - E_dielectric(v)) base / pi,   F = F0 + (1 - F0) (1 - v·h)^5
 
-The diffuse part follows the mix of B.2, with the dielectric's own Fresnel term. The shorter formula of B.3.5, meant for
-rasterisers, puts the mixed one there; both agree for metals and for dielectrics. Light is scattered once: rough
-surfaces lose what a real one would scatter twice (docs/materials.md has the loss).
+Deviations:
+
+* B.2 mixes base and lobe by F. At grazing angles v·h is large for nearly all light, so that the base keeps its light
+  while the lobe reflects all of it: a white plastic reflects up to 1.8 times what it gets. Here the base gets what the
+  lobe's directional albedo E leaves, which is the albedo scaling that glTF itself prescribes for sheen: no material
+  reflects more than it gets. What the base then sends to the eye is plain irradiance, times what filters divide by.
+* Light is scattered once: rough surfaces lose what a real one would scatter twice (docs/materials.md has the loss).
 
 All directions are unit vectors in the frame of the shading normal, z along it, on its side: z > 0. ``alpha`` is the
 roughness squared, at least :data:`MIN_ALPHA`.

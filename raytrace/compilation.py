@@ -20,6 +20,7 @@ SOURCES = (
     "casting",
     "compilation",
     "compiled",
+    "cutouts",
     "directional_albedo",
     "embree_native",
     "embree_run",

@@ -6,6 +6,7 @@ anywhere then touches two cache lines instead of seven.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,6 +29,8 @@ MATERIAL, OBJECT, LIGHT, SMOOTH = 0, 1, 2, 3
 BASE_TEXTURE, EMISSION_TEXTURE, DOUBLE_SIDED, SPECULAR, GLOSS_TEXTURE, NORMAL_TEXTURE = 0, 1, 2, 3, 4, 5
 """Columns of :attr:`CompiledScene.material_info`."""
 
+TEXTURES = [BASE_TEXTURE, EMISSION_TEXTURE, GLOSS_TEXTURE, NORMAL_TEXTURE]
+
 CORNERS, NORMALS, FACE_NORMAL, OFFSET, RECORD = 0, 9, 18, 21, 22
 """First columns of the parts of a triangle's record, and its length."""
 
@@ -44,7 +47,8 @@ class CompiledScene:
     nothing is textured).
     ``base_color``, ``emission`` (M, 3) float32; ``material_info`` (M, 6) int32: base texture, emission texture, double
     sided, specular, metallic-roughness texture, normal texture. ``gloss`` (M, 3) float32: metallic, roughness, scale of
-    the normal texture. ``prev_triangles`` (moving, RECORD) float32: the moving ones one frame ago.
+    the normal texture. ``colors`` (T, 9) float32: the corners' linear factors of the base colour, of length 1 where no
+    mesh has any. ``prev_triangles`` (moving, RECORD) float32: the moving ones one frame ago.
     ``static_count``: number of triangles that never move. Arrays of moving triangles are rewritten for every frame: one
     tracer per compiled scene.
     """
@@ -59,6 +63,7 @@ class CompiledScene:
     emission: F32
     material_info: I32
     gloss: F32
+    colors: F32
     textures: TextureAtlas
     lights: Lights
     static_count: int
@@ -72,7 +77,26 @@ class CompiledScene:
     @property
     def has_specular(self) -> bool:
         """Whether any triangle is metallic or glossy."""
-        return bool(self.material_info[np.unique(self.triangle_info[:, MATERIAL]), SPECULAR].any())
+        return bool(self._used[:, SPECULAR].any())
+
+    @property
+    def has_cutout(self) -> bool:
+        """Whether any triangle may have a hole."""
+        materials = self.scene.materials
+        return any(materials[k].alpha_cutoff is not None for k in np.unique(self.triangle_info[:, MATERIAL]))
+
+    @property
+    def ordered_meshes(self) -> list[Mesh]:
+        """Meshes in the order of their triangles."""
+        return _ordered(self.scene)
+
+    def has(self, column: int) -> bool:
+        """Whether any triangle has the texture of that column of :attr:`material_info`."""
+        return bool(self._used[:, column].max() >= 0)
+
+    @property
+    def _used(self) -> I32:
+        return self.material_info[np.unique(self.triangle_info[:, MATERIAL])]
 
     @property
     def has_motion(self) -> bool:
@@ -149,11 +173,27 @@ def _uv_density(uvs: F64, triangles: F32) -> F32:
     return density
 
 
+def _colors(meshes: Sequence[Mesh]) -> F32:
+    """The corners' colours without alpha, (T, 9) float32; (1, 9) where no mesh has any."""
+    if all(mesh.colors is None for mesh in meshes):
+        return np.ones((1, 9), np.float32)
+    parts = [
+        np.ones((len(mesh.faces), 9)) if mesh.colors is None else mesh.colors[mesh.faces][..., :3].reshape(-1, 9)
+        for mesh in meshes
+    ]
+    return np.ascontiguousarray(np.concatenate(parts), dtype=np.float32)
+
+
+def _ordered(scene: Scene) -> list[Mesh]:
+    """Meshes in the order of the triangles: those that move last."""
+    return sorted(scene.meshes, key=lambda mesh: mesh.motion is not None)
+
+
 def compile_scene(scene: Scene) -> CompiledScene:
     """Prepare ``scene`` for tracing. Raises UserError for a scene without triangles."""
     if scene.triangle_count == 0:
         raise UserError(f"{scene.name}: there is no triangle in this scene", "check that the file holds meshes")
-    meshes = [m for m in scene.meshes if m.motion is None] + [m for m in scene.meshes if m.motion is not None]
+    meshes = _ordered(scene)
     static_count = sum(len(m.faces) for m in meshes if m.motion is None)
     origin = scene.origin
     triangles = np.concatenate([_records(mesh, origin) for mesh in meshes])
@@ -178,7 +218,7 @@ def compile_scene(scene: Scene) -> CompiledScene:
         dtype=np.int32,
     )
     uvs, density = np.zeros((1, 6), np.float32), np.zeros(1, np.float32)
-    if material_info[:, :2].max() >= 0:
+    if material_info[:, TEXTURES].max() >= 0:
         zero = np.zeros((1, 2), np.float32)
         uvs = np.concatenate(
             [m.uvs[m.faces].reshape(-1, 6) if m.uvs is not None else np.tile(zero, (len(m.faces), 3)) for m in meshes]
@@ -195,6 +235,7 @@ def compile_scene(scene: Scene) -> CompiledScene:
         base_color=np.array([m.base_color for m in materials], dtype=np.float32),
         emission=np.array([m.emission for m in materials], dtype=np.float32),
         material_info=material_info,
+        colors=_colors(meshes),
         gloss=np.array([(m.metallic, m.roughness, m.normal_scale) for m in materials], dtype=np.float32),
         textures=build_atlas(scene.textures),
         lights=no_lights(),

@@ -3,8 +3,7 @@
 Illumination divided by it is that of a white surface, whatever metal or plastic it fell on, so that a filter may take
 means over texture and colour. In a white furnace it is 1.
 
-The lobe's share is linear in the reflectance F0 (Karis 2013's split sum): F0 (x - y) + y with tabulated x, y. The
-diffuse base keeps what a dielectric's Fresnel term leaves it, 1 - 0.04 - 0.96 z.
+The lobe's share is linear in the reflectance F0 (Karis 2013's split sum): F0 (x - y) + y with tabulated x, y.
 """
 
 from __future__ import annotations
@@ -32,7 +31,7 @@ _POINTS = 32  # of the quadrature, in each direction
 
 @cache
 def table() -> F32:
-    """(SIZE, SIZE, 3) float32 by cosine and roughness: x, y and z as above, height-correlated masking.
+    """(SIZE, SIZE, 2) float32 by cosine and roughness: x and y as above, height-correlated masking.
 
     Quadrature in float64: Gauss and Legendre's rule along one random number of the sampling routine, a midpoint rule
     along the other, which goes once around.
@@ -41,12 +40,11 @@ def table() -> F32:
     u: F64 = np.asarray((nodes + 1) / 2, dtype=np.float64)
     share: F64 = np.asarray(weights / 2, dtype=np.float64)
     turn: F64 = (np.arange(_POINTS, dtype=np.float64) + 0.5) * (2 * math.pi / _POINTS)
-    result = np.empty((SIZE, SIZE, 3))
+    result = np.empty((SIZE, SIZE, 2))
     for i, cosine in enumerate(np.linspace(0.0, 1.0, SIZE)):
         vz = max(float(cosine), _GRAZING)
-        result[i, :, 2] = _diffuse_loss(vz, u, share, turn)
         for k, roughness in enumerate(np.linspace(0.0, 1.0, SIZE)):
-            result[i, k, :2] = _lobe(vz, max(float(roughness) ** 2, float(MIN_ALPHA)), u, share, turn)
+            result[i, k] = _lobe(vz, max(float(roughness) ** 2, float(MIN_ALPHA)), u, share, turn)
     return result.astype(np.float32)
 
 
@@ -73,17 +71,9 @@ def _lobe(vz: float, alpha: float, u: F64, share: F64, turn: F64) -> tuple[float
     return float((mean @ weight).sum()), float((mean @ (weight * (1 - vh) ** 5)).sum())
 
 
-def _diffuse_loss(vz: float, u: F64, share: F64, turn: F64) -> float:
-    """Mean of Schlick's weight over directions distributed as their cosine."""
-    vx = math.sqrt(1 - vz * vz)
-    x, z = np.sqrt(u)[:, None] * np.cos(turn), np.sqrt(1 - u)[:, None]
-    vh = np.sqrt(np.maximum((1 + vx * x + vz * z) / 2, 0))  # half the angle between v and l
-    return float(((share / len(turn)) @ (1 - vh) ** 5).sum())
-
-
 @device
 def look_up(values, cosine, roughness):  # type: ignore[no-untyped-def]
-    """x, y and z of :func:`table` at a cosine and a roughness, both in [0, 1], bilinear."""
+    """x and y of :func:`table` at a cosine and a roughness, both in [0, 1], bilinear."""
     a, b = min(max(cosine, _ZERO), _ONE) * _LAST, min(max(roughness, _ZERO), _ONE) * _LAST
     i, k = min(int(a), SIZE - 2), min(int(b), SIZE - 2)
     p, q = a - np.float32(i), b - np.float32(k)
@@ -91,5 +81,4 @@ def look_up(values, cosine, roughness):  # type: ignore[no-untyped-def]
     low, high = values[i], values[i + 1]
     x = w00 * low[k, 0] + w01 * low[k + 1, 0] + w10 * high[k, 0] + w11 * high[k + 1, 0]
     y = w00 * low[k, 1] + w01 * low[k + 1, 1] + w10 * high[k, 1] + w11 * high[k + 1, 1]
-    z = w00 * low[k, 2] + w01 * low[k + 1, 2] + w10 * high[k, 2] + w11 * high[k + 1, 2]
-    return x, y, z
+    return x, y

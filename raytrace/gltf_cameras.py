@@ -10,6 +10,7 @@ from raytrace.camera import Camera, NamedCamera
 from raytrace.gltf_file import GltfFile
 from raytrace.gltf_nodes import Node, check_invertible
 from raytrace.parts import F64
+from raytrace.repair import check_coordinates
 
 
 def read_cameras(file: GltfFile, nodes: Sequence[Node], notices: Notices) -> list[NamedCamera]:
@@ -28,6 +29,7 @@ def read_cameras(file: GltfFile, nodes: Sequence[Node], notices: Notices) -> lis
             notices.add(f"{where} is not a perspective camera: not used")
             continue
         check_invertible(file, node)
+        check_coordinates(node.matrix[None, :3, 3], f"{file.path}: {where}, in world space")
         name, number = node.name, 2
         while name in names:
             name, number = f"{node.name} {number}", number + 1

@@ -12,6 +12,7 @@ from raytrace.gltf_file import Entry, GltfFile
 from raytrace.gltf_nodes import Node
 from raytrace.parts import F64, normalized
 from raytrace.punctual import KINDS, Kind, PunctualLight, Vector
+from raytrace.repair import check_coordinates
 
 EXTENSION = "KHR_lights_punctual"
 
@@ -61,6 +62,7 @@ def _light(file: GltfFile, entry: Entry, node: Node) -> PunctualLight:
         raise file.error(f"{where} has cones of {inner:.4g} and {outer:.4g} radians; 0 <= inner < outer <= pi / 2")
     r, g, b = (c * intensity for c in color)
     position, direction = _placed(node.matrix)
+    check_coordinates(np.array([position]), f"{file.path}: {where}, in world space")
     return PunctualLight(
         name,
         kind,

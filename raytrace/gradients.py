@@ -256,6 +256,50 @@ def _replace(  # type: ignore[no-untyped-def]
             pixels[i], frames[i] = points.pixel[best], frame
 
 
+@device
+def _spread(carried, k, chosen, before, direct, indirect, gradient):  # type: ignore[no-untyped-def]
+    """Write the gradient of stratum ``k``, whose sample in pixel ``carried`` of the tile was carried over."""
+    for signal in range(2):
+        now = _luminance(direct, carried) if signal == 0 else _luminance(indirect, carried)
+        then = before.light[chosen, signal]
+        # Not a number and infinity take no part: they would be spread over all the strata around.
+        if abs(now) < _FAR and abs(then) < _FAR:
+            gradient[k, 2 * signal] = now - then
+            gradient[k, 2 * signal + 1] = max(now, then)
+
+
+@device
+def _brightest(corner, columns, lines, width, carried, triangle, direct, indirect):  # type: ignore[no-untyped-def]
+    """The pixel with the brightest sample of its own; -1 where all are dark."""
+    best, most = -1, _ZERO
+    for y in range(lines):
+        for i in range(corner + y * width, corner + y * width + columns):
+            light = _luminance(direct, i) + _luminance(indirect, i)
+            if triangle[i] >= 0 and i != carried and light > most:
+                best, most = i, light
+    return best
+
+
+@device
+def _random(corner, columns, lines, width, carried, triangle, bits):  # type: ignore[no-untyped-def]
+    """One of the pixels that show a surface and have a sample of their own, each with the same chance; -1 for none."""
+    count = 0
+    for y in range(lines):
+        for i in range(corner + y * width, corner + y * width + columns):
+            if triangle[i] >= 0 and i != carried:
+                count += 1
+    if count == 0:
+        return -1
+    place = int(bits % uint32(count))
+    for y in range(lines):
+        for i in range(corner + y * width, corner + y * width + columns):
+            if triangle[i] >= 0 and i != carried:
+                if place == 0:
+                    return i
+                place -= 1
+    return -1
+
+
 @kernel
 def _note(  # type: ignore[no-untyped-def]
     triangles, before, landings, eye, width, first, seed, frame, brightest, triangle, u, v, direct, indirect, chosen,
@@ -264,47 +308,29 @@ def _note(  # type: ignore[no-untyped-def]
     across = (width + STRATUM - 1) // STRATUM
     start = first // width
     rows = triangle.shape[0] // width
-    for k in range(start // STRATUM * across, (start + rows + STRATUM - 1) // STRATUM * across):
-        carried = -1
-        if chosen[k] >= 0:
-            carried = landings.pixel[chosen[k]] - first
-            direct[carried, 3] = CARRIED
-            for signal in range(2):
-                now = _luminance(direct, carried) if signal == 0 else _luminance(indirect, carried)
-                then = before.light[chosen[k], signal]
-                # Not a number and infinity take no part: they would be spread over all the strata around.
-                if abs(now) < _FAR and abs(then) < _FAR:
-                    gradient[k, 2 * signal] = now - then
-                    gradient[k, 2 * signal + 1] = max(now, then)
-
-        # The pixels to choose from: those that show a surface and have a sample of their own.
-        corner = (k // across * STRATUM - start) * width + k % across * STRATUM
-        columns = min(STRATUM, width - k % across * STRATUM)
-        lines = min(STRATUM, rows - (k // across * STRATUM - start))
-        count, best, most = 0, -1, _ZERO
-        for j in range(columns * lines):
-            i = corner + j // columns * width + j % columns
-            if triangle[i] >= 0 and i != carried:
-                count += 1
-                light = _luminance(direct, i) + _luminance(indirect, i)
-                if light > most:
-                    best, most = i, light
-        if not brightest and count > 0:
-            place = int(wang(uint32(path_key(seed, k) ^ uint32(frame * uint32(0x9E3779B9)))) % uint32(count))
-            for j in range(columns * lines):
-                i = corner + j // columns * width + j % columns
-                if triangle[i] >= 0 and i != carried:
-                    if place == 0:
-                        best = i
-                    place -= 1
-        elif count == 0:
-            best = -1
-        points.triangle[k] = -1
-        if best >= 0:
-            direct[best, 3] = REMEMBERED
-            points.triangle[k], points.u[k], points.v[k] = triangle[best], u[best], v[best]
-            x, y, z = interpolate(triangles[triangle[best]], 0, u[best], v[best])
-            points.front[k] = _sees_front(triangles[triangle[best]], x, y, z, eye)
-            points.pixel[k] = first + best
-            points.light[k, 0] = _luminance(direct, best)
-            points.light[k, 1] = _luminance(indirect, best)
+    salt = uint32(frame * uint32(0x9E3779B9))
+    for row in range((rows + STRATUM - 1) // STRATUM):
+        lines = min(STRATUM, rows - row * STRATUM)
+        for column in range(across):
+            k = (start // STRATUM + row) * across + column
+            carried = -1
+            if chosen[k] >= 0:
+                carried = landings.pixel[chosen[k]] - first
+                direct[carried, 3] = CARRIED
+                _spread(carried, k, chosen[k], before, direct, indirect, gradient)
+            corner = row * STRATUM * width + column * STRATUM
+            columns = min(STRATUM, width - column * STRATUM)
+            if brightest:
+                best = _brightest(corner, columns, lines, width, carried, triangle, direct, indirect)
+            else:
+                bits = wang(uint32(path_key(seed, k) ^ salt))
+                best = _random(corner, columns, lines, width, carried, triangle, bits)
+            points.triangle[k] = -1
+            if best >= 0:
+                direct[best, 3] = REMEMBERED
+                points.triangle[k], points.u[k], points.v[k] = triangle[best], u[best], v[best]
+                x, y, z = interpolate(triangles[triangle[best]], 0, u[best], v[best])
+                points.front[k] = _sees_front(triangles[triangle[best]], x, y, z, eye)
+                points.pixel[k] = first + best
+                points.light[k, 0] = _luminance(direct, best)
+                points.light[k, 1] = _luminance(indirect, best)

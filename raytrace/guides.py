@@ -16,8 +16,8 @@ from raytrace.compilation import device, inlined, kernel
 from raytrace.compiled import FACE_NORMAL, MATERIAL, OBJECT, SMOOTH, SPECULAR
 from raytrace.lights import environment_at
 from raytrace.reflectance import albedos
-from raytrace.surface import footprint_of, seen_from, surface_gloss
-from raytrace.tables import Variant, interpolate, shading_normal, surface_color
+from raytrace.surface import bumped, footprint_of, seen_from, surface_gloss, view_cosine
+from raytrace.tables import Variant, base_color, interpolate, shading_normal, surface_color
 
 _ZERO, _ONE, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
 MIN_COSINE = np.float32(0.05)  # grazing limit of the depth gradient and of texture footprints
@@ -75,14 +75,12 @@ class Outputs(NamedTuple):
 
 
 @inlined
-def _write_albedos(textured, tables, out, p, t, material, u, v, pixel, ex, ey, ez, gx, gy, gz, nx, ny, nz):  # type: ignore[no-untyped-def]
-    """Both albedos and the roughness of a point in a scene with specular surfaces, seen from (ex, ey, ez) beside it.
+def _write_albedos(textured, colored, glossmap, tables, out, p, t, material, u, v, footprint, cosine):  # type: ignore[no-untyped-def]
+    """Both albedos and the roughness of a point seen at ``cosine`` in a scene with specular surfaces.
 
     By the same arithmetic as the sample that is divided by them; a diffuse surface has roughness 1 and no specular.
     """
-    distance, cosine, facing = seen_from(ex, ey, ez, gx, gy, gz, nx, ny, nz)
-    footprint = footprint_of(pixel, distance, facing)
-    r, g, b, metallic, roughness = surface_gloss(textured, tables, t, material, u, v, footprint)
+    r, g, b, metallic, roughness = surface_gloss(textured, colored, glossmap, tables, t, material, u, v, footprint)
     sr, sg, sb = _ZERO, _ZERO, _ZERO
     if tables.material_info[material, SPECULAR] != 0:
         r, g, b, sr, sg, sb = albedos(tables.reflectance, r, g, b, metallic, roughness, cosine)
@@ -98,7 +96,8 @@ def guide_kernel(variant: Variant, positions: bool) -> Callable[..., Any]:
     """Kernel that writes the noise-free guides of a tile; ``positions``: world positions as well."""
     textured = variant.textured
     has_sky, environment = variant.sky, variant.environment
-    moving, specular = variant.moving, variant.specular
+    moving, specular, glossmap = variant.moving, variant.specular, variant.glossmap
+    bumps, colored = variant.bumps, variant.colored
 
     @kernel
     def guides(  # type: ignore[no-untyped-def]
@@ -146,6 +145,13 @@ def guide_kernel(variant: Variant, positions: bool) -> Callable[..., Any]:
             x, y, z = interpolate(record, 0, u[i], v[i])
             gx, gy, gz = record[FACE_NORMAL], record[FACE_NORMAL + 1], record[FACE_NORMAL + 2]
             nx, ny, nz = shading_normal(record, tables.info[t, SMOOTH], u[i], v[i])
+            material = tables.info[t, MATERIAL]
+            if specular or bumps:  # as the sample that is divided by the albedo has it
+                ex, ey, ez = eye[0] - x, eye[1] - y, eye[2] - z
+                distance, facing = seen_from(ex, ey, ez, gx, gy, gz)
+                near = footprint_of(pixel, distance, facing)
+            if bumps:
+                nx, ny, nz = bumped(tables, record, t, material, u[i], v[i], near, nx, ny, nz)
             dx, dy, dz = directions[i, 0], directions[i, 1], directions[i, 2]
             front = gx * dx + gy * dy + gz * dz <= _ZERO
             if not front:
@@ -164,15 +170,12 @@ def guide_kernel(variant: Variant, positions: bool) -> Callable[..., Any]:
             out.surface[p, 2] = nz
             out.surface[p, 3] = depth
 
-            material = tables.info[t, MATERIAL]
             footprint = pixel * depth * math.sqrt(-length / facing)
             if specular:
-                ex, ey, ez = eye[0] - x, eye[1] - y, eye[2] - z
-                _write_albedos(
-                    textured, tables, out, p, t, material, u[i], v[i], pixel, ex, ey, ez, gx, gy, gz, nx, ny, nz
-                )
+                cosine = view_cosine(ex, ey, ez, nx, ny, nz, distance)
+                _write_albedos(textured, colored, glossmap, tables, out, p, t, material, u[i], v[i], near, cosine)
             else:
-                r, g, b = surface_color(textured, tables, 0, tables.base_color, t, material, u[i], v[i], footprint)
+                r, g, b = base_color(textured, colored, tables, t, material, u[i], v[i], footprint)
                 out.albedo[p, 0] = r
                 out.albedo[p, 1] = g
                 out.albedo[p, 2] = b
@@ -192,6 +195,8 @@ def guide_kernel(variant: Variant, positions: bool) -> Callable[..., Any]:
                     before = tables.prev_triangles[t - tables.static_count]
                     px, py, pz = interpolate(before, 0, u[i], v[i])
                     qx, qy, qz = shading_normal(before, tables.info[t, SMOOTH], u[i], v[i])
+                    if bumps:
+                        qx, qy, qz = bumped(tables, before, t, material, u[i], v[i], near, qx, qy, qz)
                     if not front:
                         qx, qy, qz = -qx, -qy, -qz
                 out.prev_normal[p, 0] = qx

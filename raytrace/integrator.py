@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from raytrace import kernels, kernels_glossy
 from raytrace.camera import Camera
 from raytrace.compiled import OBJECT, CompiledScene
+from raytrace.cutouts import CutoutCaster, cutouts_of
 from raytrace.embree import open_caster
 from raytrace.features import ILLUMINATION, images_of
 from raytrace.frame import STRATUM, FramePacket
@@ -45,6 +46,8 @@ FIRST_SAMPLE = 1 << 31
 
 
 _identities = itertools.count(1)
+_NO_GLOSS = np.zeros((1, 3), np.float32)
+"""Stands for the specular signal that a scene has not; nothing is written there but its zeros."""
 
 
 @dataclass(frozen=True)
@@ -145,19 +148,23 @@ class Settings:
 class Tracer:
     """Traces one compiled scene. ``with Tracer(...)`` or :meth:`close` ends its threads.
 
-    ``images``: names of those its frames have. ``scene_id``: their number, which no other tracer of this process gives.
+    ``variant``: what is compiled in, if that is to be more than the scene needs. ``images``: names of those its frames
+    have. ``scene_id``: their number, which no other tracer of this process gives.
     """
 
-    def __init__(self, scene: CompiledScene, settings: Settings | None = None) -> None:
+    def __init__(self, scene: CompiledScene, settings: Settings | None = None, variant: Variant | None = None) -> None:
         self.scene = scene
         self.settings = settings or Settings()
-        self.variant: Variant = variant_of(scene)
+        self.variant: Variant = variant or variant_of(scene)
         self.images = images_of(self.variant, self.settings.positions)
         self.scene_id = next(_identities)
         self.rays = open_caster(scene.triangles, scene.static_count, self.settings.backend)
+        if (holes := cutouts_of(scene)) is not None:
+            self.rays = CutoutCaster(self.rays, holes)
         self.tables = tables_of(scene)
         self._guides = guide_kernel(self.variant, self.settings.positions)
-        if self.variant.specular:
+        self._detailed = self.variant.specular or self.variant.bumps
+        if self._detailed:
             self._first_hit = kernels_glossy.first_hit_kernel(self.variant, self.settings.separable)
             self._second_hit = kernels_glossy.second_hit_kernel(self.variant, self.settings.separable)
         else:
@@ -255,9 +262,8 @@ class Tracer:
         In a scene with specular surfaces also ``specular``, divided by theirs; there it depends on ``eye`` itself, and
         on ``pixel``, the width of a pixel at distance 1, by which textures are filtered.
         """
-        if self.variant.specular:
-            assert specular is not None
-            self._shade_glossy(hits, seeds, eye, direct, indirect, specular, pixel)
+        if self._detailed:
+            self._shade_detailed(hits, seeds, eye, direct, indirect, specular, pixel)
             return
         count = len(hits.triangle)
         s = self._scratch
@@ -281,14 +287,16 @@ class Tracer:
         )  # fmt: skip
         self._trace_shadows(shadows, indirect)
 
-    def _shade_glossy(
-        self, hits: Hits, seeds: Seeds, eye: F32, direct: F32, indirect: F32, specular: F32, pixel: float
+    def _shade_detailed(
+        self, hits: Hits, seeds: Seeds, eye: F32, direct: F32, indirect: F32, specular: F32 | None, pixel: float
     ) -> None:
+        """:meth:`shade` where surfaces are metallic, glossy or bumpy; ``specular`` None if only bumpy."""
         count = len(hits.triangle)
         s, settings = self._scratch, self.settings
         s.reserve(count)
         s.reserve_glossy(count)
-        for image in (direct, indirect, specular):
+        gloss = _NO_GLOSS if specular is None else specular
+        for image in (direct, indirect, gloss):
             image[:, :3] = 0.0
         shadows, bounces = self._first_hit(
             self.tables, hits.triangle, hits.u, hits.v, eye, np.float32(pixel), seeds.pixel, seeds.frame,
@@ -303,7 +311,7 @@ class Tracer:
         shadows = self._second_hit(
             self.tables, triangle, u, v, bounce_o, bounce_d, s.bounce_index, s.bounce_pdf, s.bounce_cosine,
             s.bounce_weight, seeds.pixel, seeds.frame, settings.seed, settings.generator, settings.regularize, direct,
-            specular, s.shadow_o, s.shadow_d, s.index, s.light, s.gloss,
+            gloss, s.shadow_o, s.shadow_d, s.index, s.light, s.gloss,
         )  # fmt: skip
         self._trace_shadows(shadows, indirect, specular)
 

@@ -31,7 +31,7 @@ from raytrace.sampling import (
     random_pair,
     sample_cosine,
 )
-from raytrace.tables import Variant, interpolate, shading_normal, surface_color
+from raytrace.tables import Variant, base_color, interpolate, shading_normal, surface_color
 
 _ZERO, _ONE = np.float32(0.0), np.float32(1.0)
 _PI, _INV_PI = np.float32(math.pi), np.float32(1.0 / math.pi)
@@ -100,7 +100,7 @@ def second_hit_kernel(variant: Variant) -> Callable[..., Any]:
     """Kernel that shades bounce hits: adds light found by the ray to ``direct``, writes shadow rays; returns how
     many."""
     textured, lamps, punctual = variant.textured, variant.lamps, variant.punctual
-    has_sky, environment = variant.sky, variant.environment
+    has_sky, environment, colored = variant.sky, variant.environment, variant.colored
 
     @kernel
     def second_hit(  # type: ignore[no-untyped-def]
@@ -157,7 +157,7 @@ def second_hit_kernel(variant: Variant) -> Callable[..., Any]:
             scale = (wx * nx + wy * ny + wz * nz) * _INV_PI / abs(density)
             r, g, bl = r * scale, g * scale, bl * scale
             footprint = BOUNCE_CONE * math.sqrt(square)
-            ar, ag, ab = surface_color(textured, tables, 0, tables.base_color, t, material, u[k], v[k], footprint)
+            ar, ag, ab = base_color(textured, colored, tables, t, material, u[k], v[k], footprint)
             r, g, bl = r * ar, g * ag, bl * ab
             if r + g + bl > _ZERO:
                 shadow_o[shadows, 0] = x + gx * offset

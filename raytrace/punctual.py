@@ -75,5 +75,5 @@ def punctual_rows(lights: Sequence[PunctualLight], origin: F64, time: float = 0.
         # KHR_lights_punctual, "Inner and Outer Cone Angles".
         row[CONE_SCALE] = 1.0 / max(0.001, math.cos(light.inner) - math.cos(light.outer))
         row[CONE_OFFSET] = -math.cos(light.outer) * row[CONE_SCALE]
-        row[INVERSE_RANGE] = 0.0 if math.isinf(light.range) else 1.0 / light.range
+        row[INVERSE_RANGE] = 0.0 if math.isinf(light.range) else 1.0 / max(light.range, 1e-18)
     return rows.astype(np.float32)

@@ -26,29 +26,30 @@ def head_on(base, metallic):  # type: ignore[no-untyped-def]
 
 
 @device
-def lobe_albedo(base, metallic, x, y):  # type: ignore[no-untyped-def]
-    """Directional albedo of the specular lobe in one channel, at least :data:`LEAST`; x, y: of the table."""
-    return max(head_on(base, metallic) * (x - y) + y, LEAST)
+def lobe_albedo(reflectance, x, y):  # type: ignore[no-untyped-def]
+    """Directional albedo of a lobe of that F0; x, y: of the table."""
+    return reflectance * (x - y) + y
 
 
 @device
-def diffuse_share(z):  # type: ignore[no-untyped-def]
-    """What the Fresnel term of a dielectric leaves for its diffuse base, averaged over the light's directions."""
-    return (_ONE - DIELECTRIC) * (_ONE - z)
+def base_share(metallic, x, y):  # type: ignore[no-untyped-def]
+    """What metal, and the lobe over what is none, leave for the diffuse base."""
+    return (_ONE - metallic) * (_ONE - lobe_albedo(DIELECTRIC, x, y))
 
 
 @device
 def albedos(table, r, g, b, metallic, roughness, cosine):  # type: ignore[no-untyped-def]
-    """Diffuse (3) and specular (3) directional albedo of base colour (r, g, b) seen at ``cosine``."""
-    x, y, z = look_up(table, cosine, roughness)
-    base = diffuse_share(z) * (_ONE - metallic)
+    """Diffuse (3) and specular (3) directional albedo of base colour (r, g, b) seen at ``cosine``; the latter at least
+    :data:`LEAST`."""
+    x, y = look_up(table, cosine, roughness)
+    base = base_share(metallic, x, y)
     return (
         r * base,
         g * base,
         b * base,
-        lobe_albedo(r, metallic, x, y),
-        lobe_albedo(g, metallic, x, y),
-        lobe_albedo(b, metallic, x, y),
+        max(lobe_albedo(head_on(r, metallic), x, y), LEAST),
+        max(lobe_albedo(head_on(g, metallic), x, y), LEAST),
+        max(lobe_albedo(head_on(b, metallic), x, y), LEAST),
     )
 
 

@@ -52,12 +52,18 @@ class Gradient(FragmentPass):
 
 
 class Lambda(FragmentPass):
-    """How much of each signal's history is void."""
+    """How much of each signal's history is void, and by which factor the light has changed, for every pixel."""
 
     shader = "asvgf/lambda.frag"
     in_change = In(CHANGE)
-    out_lambda = Out("rgba16f", LAMBDA, divisor=STRATUM)
+    in_strata = In(SURFACE)
+    in_surface = In(SURFACE)
+    in_gradient = In("depth change per pixel, scene units")
+    out_lambda = Out("rgba16f", LAMBDA)
     u_gain = Uniform("float", ">= 0, λ per relative change")
+    u_sigma_z = Uniform("float", "> 0, depth edge-stopping")
+    u_sigma_n = Uniform("float", "> 0, exponent of the normals' cosine")
+    u_pixel_size = Uniform("float", "> 0, scene units a pixel is wide at depth 1")
 
 
 def change_of(g: Graph, direct: Tex, indirect: Tex, guides: Guides, p: Asvgf, pixel_size: float, joint: bool) -> Tex:
@@ -87,8 +93,19 @@ def change_of(g: Graph, direct: Tex, indirect: Tex, guides: Guides, p: Asvgf, pi
             in_slope=strata.out_slope,
             **light,
         ).out_change
+    work = Lambda(
+        u_gain=p.gain,
+        u_sigma_z=p.sigma_z,
+        u_sigma_n=float(p.sigma_n),
+        u_pixel_size=pixel_size,
+        defines={"WIDEN": int(p.widen), "FOLLOW": int(p.follow)},
+    )
     return g.add(
-        Lambda(u_gain=p.gain, defines={"WIDEN": int(p.widen), "FOLLOW": int(p.follow)}), in_change=change
+        work,
+        in_change=change,
+        in_strata=strata.out_surface,
+        in_surface=guides.surface,
+        in_gradient=guides.gradient,
     ).out_lambda
 
 

@@ -62,7 +62,7 @@ class Atrous(FragmentPass):
     def __init__(self, p: Svgf, step: int, pixel_size: float, raw: bool = False, glossy: bool = False) -> None:
         # A power of two is squared into place: pow() costs more than seven products.
         squarings = p.sigma_n.bit_length() - 1
-        gloss: dict[str, Any] = {"u_sigma_r": p.sigma_r} if glossy else {}
+        gloss: dict[str, Any] = {"u_sigma_r": p.sigma_r, "u_reach": p.reach} if glossy else {}
         super().__init__(
             defines={
                 "STEP": step,
@@ -81,10 +81,15 @@ class Atrous(FragmentPass):
 
 
 class GlossyAtrous(Atrous):
-    """The same for specular light, in which only surfaces of the same roughness have a part."""
+    """The same for specular light, in which only surfaces of the same roughness have a part.
+
+    What a narrow lobe reflects has edges that no guide shows, and less noise than a wide one: the distance over which
+    it is averaged grows with the lobe's width, as in NVIDIA's NRD.
+    """
 
     in_specular_albedo = In(GLOSS)
     u_sigma_r = Uniform("float", "> 0, roughness edge-stopping")
+    u_reach = Uniform("float", "> 0, pixels per squared roughness")
 
     def __init__(self, p: Svgf, step: int, pixel_size: float, raw: bool = False) -> None:
         super().__init__(p, step, pixel_size, raw, glossy=True)

@@ -128,7 +128,7 @@ class AccumulateAdaptive(Accumulate):
     Each signal then has a history length of its own, which travels with the moments.
     """
 
-    in_lambda = In("λ, [0;1] how much of each signal's history is void, one texel for each 3x3 pixels")
+    in_lambda = In("xy: λ, [0;1] how much of each signal's history is void; zw: factors by which they have changed")
     out_moments = Out(
         "rgba32f", "xy: first and second moment of luminance; z: part of the length that is left; w: history length N"
     )

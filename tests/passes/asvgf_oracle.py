@@ -17,6 +17,7 @@ from tests.passes.svgf_oracle import F64, REC_709, Found, Oracle, Signal, gather
 
 FLOOR = 1e-3
 LARGEST_FACTOR = 4.0
+REACH, STRANGER = 4.5, 1e-4
 
 
 def with_gradients(packet: FramePacket, seed: int, changed: float = 0.3) -> FramePacket:
@@ -111,18 +112,36 @@ def spread(change: F64, strata: Strata, step: int, p: Asvgf, pixel_size: float) 
     return np.asarray(result / np.repeat(total, 2, axis=-1))
 
 
-def void_and_factor(change: F64, p: Asvgf) -> F64:
-    """λ of both signals, and the factors by which they have changed."""
+def relative(change: F64) -> F64:
+    """Of both signals in parts of the larger of now and then."""
     larger = np.maximum(change[..., 1::2], FLOOR * change[..., 1::2].sum(-1, keepdims=True))
-    relative = change[..., ::2] / np.maximum(larger, 1e-30)  # below that single precision ends
-    share = np.minimum(p.gain * np.abs(relative), 1.0)
-    if p.widen:
-        padded = np.pad(share, ((1, 1), (1, 1), (0, 0)), mode="edge")
-        share = np.max([padded[j : j + len(share), i : i + share.shape[1]] for j, i in np.ndindex(3, 3)], axis=0)
-    factor = np.ones(relative.shape)
+    return np.asarray(np.clip(change[..., ::2] / np.maximum(larger, 1e-30), -1.0, 1.0))  # single precision ends there
+
+
+def void_and_factor(change: F64, strata: Strata, packet: FramePacket, p: Asvgf) -> F64:
+    """λ of both signals, and the factors by which they have changed, for every pixel."""
+    width, height = packet.size
+    y, x = np.mgrid[:height, :width]
+    normal, depth = packet.surface[..., :3].astype(np.float64), packet.surface[..., 3].astype(np.float64)
+    slope = np.abs(packet.gradient.astype(np.float64))
+    total, widest = np.zeros((height, width, 4)), np.zeros((height, width, 2))
+    for dy, dx in np.ndindex(3, 3):
+        at = x // STRATUM + dx - 1, y // STRATUM + dy - 1
+        values, inside = gather(change, *at)
+        surface, _ = gather(strata.surface, *at)
+        away = np.abs(np.stack([STRATUM * at[0] + 1 - x, STRATUM * at[1] + 1 - y], -1)).astype(np.float64)
+        floor = 0.1 * packet.pixel_size * depth * (np.linalg.norm(away, axis=-1) + 1)
+        range_ = p.sigma_z * (slope * (away + 1)).sum(-1) + floor + 1e-30
+        cosine = np.maximum(np.einsum("hwk,hwk->hw", surface[..., :3], normal), 0.0)
+        likeness = cosine**p.sigma_n * np.exp(-np.abs(surface[..., 3] - depth) / range_)
+        near = np.maximum(1 - away / REACH, 0.0).prod(-1)
+        total += (inside * near * (likeness + STRANGER))[..., None] * values
+        widest = np.maximum(widest, np.abs(relative(values)) * inside[..., None])
+    whole = relative(total)
+    share = np.minimum(p.gain * (widest if p.widen else np.abs(whole)), 1.0)
+    factor = np.ones(whole.shape)
     if p.follow:
-        relative = np.clip(relative, -1.0, 1.0)
-        factor = np.where(relative < 0, 1 + relative, 1 / np.maximum(1 - relative, 1 / LARGEST_FACTOR))
+        factor = np.where(whole < 0, 1 + whole, 1 / np.maximum(1 - whole, 1 / LARGEST_FACTOR))
     return np.concatenate([share, factor], -1)
 
 
@@ -146,7 +165,7 @@ class AdaptiveOracle(Oracle):
         self.steps = {"surface": strata.surface, "slope": strata.slope, "light": strata.light}
         for i in range(p.gradient_iterations):
             change = self.steps[f"gradient{i}"] = spread(change, strata, 1 << i, p, packet.pixel_size)
-        self.lambdas = self.steps["lambda"] = void_and_factor(change, p)
+        self.lambdas = self.steps["lambda"] = void_and_factor(change, strata, packet, p)
         if self.store is to_half:
             self.lambdas = to_half(self.lambdas)
         return super().step(packet)
@@ -162,10 +181,8 @@ class AdaptiveOracle(Oracle):
         if history is None:
             self.left[name] = np.ones(common.shape)
             return sample, moments
-        height, width = common.shape
         channel = int(name == "indirect")
-        at_pixels = self.lambdas.repeat(STRATUM, 0).repeat(STRATUM, 1)[:height, :width]
-        void, factor = at_pixels[..., channel], at_pixels[..., 2 + channel]
+        void, factor = self.lambdas[..., channel], self.lambdas[..., 2 + channel]
         known = common > 0
         length = common * found.fetch(self.left[name][..., None])[..., 0]
         before = found.fetch(history.color)

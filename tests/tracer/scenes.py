@@ -219,7 +219,38 @@ def glossy() -> Scene:
         mesh("lamp", quad((-0.3, 1.8, -0.3), (0.3, 1.8, -0.3), (0.3, 1.8, 0.3), (-0.3, 1.8, 0.3)), 3),
     ]
     camera = Camera.look_at((0.4, 1.3, 3.4), (0.0, 0.6, 0.0), yfov_degrees=50.0)
-    return replace(scene(meshes, materials, camera, (0.4, 0.6, 0.9)), textures=(Texture("tiles", tiles),))
+    what = replace(scene(meshes, materials, camera, (0.4, 0.6, 0.9)), textures=(Texture("tiles", tiles),))
+    return with_every_material(what)
+
+
+def with_every_material(what: Scene) -> Scene:
+    """``what`` and, far below it, a small patch that has all features of a material, a dim lamp, a hint of a sky.
+
+    Scenes of all tests then need the same kernels, which take long to compile.
+    """
+    first, textures = len(what.materials), len(what.textures)
+    grey = np.full((2, 2, 3), 128, np.uint8)
+    patch = Material(
+        "patch",
+        specular=True,
+        base_texture=textures,
+        metallic_roughness_texture=textures + 1,
+        normal_texture=textures + 1,
+    )
+    lamp = Material("dim", emission=(1e-4, 1e-4, 1e-4))
+    below = quad((-0.1, -90, 0.1), (0.1, -90, 0.1), (0.1, -90, -0.1), (-0.1, -90, -0.1))
+    added = mesh("patch", below, first, uvs=below[..., ::2] * 5)
+    return replace(
+        what,
+        meshes=(
+            *what.meshes,
+            replace(added, colors=np.ones((6, 4), np.float32)),
+            mesh("dim", below[:, ::-1] - np.array([0.0, 1.0, 0.0]), first + 1),
+        ),
+        materials=(*what.materials, patch, lamp),
+        textures=(*what.textures, Texture("grey", grey), Texture("plain", grey, linear=True)),
+        sky=what.sky or (1e-6, 1e-6, 1e-6),
+    )
 
 
 # ------------------------------------------------------------------------------------------------------------ tracing

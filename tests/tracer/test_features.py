@@ -98,10 +98,8 @@ def test_kernels_contain_what_the_scene_needs(trace: OpenTracer, what: Scene) ->
         "specular": variant.specular,
     }
     kinds = {name: getattr(variant, name) for name in ("textured", "lamps", "punctual", "environment")}
-    shading = kinds | {"has_sky": variant.sky}
-    if variant.specular:
-        shading["separable"] = False
-    assert first == second == shading
+    masking = {"separable": False} if variant.specular else {}
+    assert first == second == kinds | {"has_sky": variant.sky} | masking
 
 
 def test_everything_is_counted() -> None:

@@ -109,7 +109,7 @@ void main() {
         float share = max(1.0 / (history + 1.0), u_alpha);
         color /= total;
 #ifdef ADAPTIVE
-        vec4 change = texelFetch(in_lambda, p / 3, 0);
+        vec4 change = texelFetch(in_lambda, p, 0);
         float void_share = clamp(change.x, 0.0, 1.0);
         color *= change.z;
         share = mix(share, 1.0, void_share);

@@ -111,7 +111,7 @@ void main() {
 #endif
 #ifdef ADAPTIVE
         n *= left / total;
-        vec4 change = texelFetch(in_lambda, p / 3, 0);
+        vec4 change = texelFetch(in_lambda, p, 0);
         void_share = clamp(change[SIGNAL], 0.0, 1.0);
         // What was seen in other light, as it would be in this one.
         float factor = change[2 + SIGNAL];
