@@ -1,4 +1,4 @@
-"""What a feature of materials costs a scene that has none of it: compiled in but unused, against compiled out.
+"""What a feature costs a scene that has none of it: compiled in but unused, against compiled out.
 
 ``python -m bench.features [scene ...]``. Both kinds of frames are traced in turns and take the same decisions; medians.
 """
@@ -26,6 +26,11 @@ SIZE: Final = (640, 360)
 ROUNDS: Final = 15
 
 FEATURES: Final = {
+    "textured": "textures",
+    "sky": "a constant sky",
+    "environment": "light from an environment's image",
+    "punctual": "lights without a surface",
+    "moving": "moving objects",
     "specular": "metals and gloss: the second lobe, its signal and its albedo",
     "glossmap": "textures of roughness and metal",
     "bumps": "normal maps",
@@ -69,7 +74,7 @@ def measure(scene: str, size: tuple[int, int] = SIZE, rounds: int = ROUNDS) -> l
 
 
 def _with(compiled: CompiledScene, feature: str) -> Tracer:
-    """A tracer of the same scene with the code of ``feature``, for which no material asks."""
+    """A tracer of the same scene with the code of ``feature``, for which nothing in it asks."""
     if feature == "colored":
         compiled = replace(compiled, colors=np.ones((len(compiled.triangles), 9), np.float32))
     plain = Tracer(compiled, Settings(threads=1))
