@@ -80,7 +80,8 @@ void main() {
     for (int i = 0; i <= last; ++i)
         if ((mask & (16 << i)) != 0) gather(centre + ivec2(i % 3 - 1, i / 3 - 1), 1.0);
 
-    float n = 0.0, void_share = 0.0; // frames behind the history, and what of it the change of light takes away
+    // Frames behind the history, what of it the change of light takes away, and what of this frame's sample is news.
+    float n = 0.0, void_share = 0.0, news = 1.0;
     if (total > 0.0) {
         color /= total;
         moments /= total;
@@ -97,13 +98,15 @@ void main() {
         float factor = change[2 + SIGNAL];
         color = clamp_radiance(color * factor);
         moments *= vec2(factor, factor * factor);
+        // A sample that was carried over from the last frame is in the history already, unless its light has changed.
+        if (texelFetch(in_color, p, 0).a == 0.0) news = void_share;
 #if POWER
         n *= pow(max(1.0 - void_share, 1e-9), u_power); // pow(0, 0) is undefined
 #endif
 #endif
         float share = 1.0 / (n + 1.0);
-        c = usable ? mix(color, c, mix(max(share, u_alpha), 1.0, void_share)) : color;
-        m = usable ? mix(moments, m, mix(max(share, u_alpha_moments), 1.0, void_share)) : moments;
+        c = usable ? mix(color, c, news * mix(max(share, u_alpha), 1.0, void_share)) : color;
+        m = usable ? mix(moments, m, news * mix(max(share, u_alpha_moments), 1.0, void_share)) : moments;
     }
     out_color = vec4(c, sqrt(max(m.y - m.x * m.x, 0.0))); // the difference may round below zero
 #if HALF
@@ -113,7 +116,7 @@ void main() {
 #if !POWER
     n = max((n + 1.0) / (1.0 + void_share * n) - 1.0, 0.0);
 #endif
-    out_moments = vec4(m, (n + 1.0) / (found.w + 1.0), n);
+    out_moments = vec4(m, (n + news) / (found.w + 1.0), max(n - (1.0 - news), 0.0));
 #else
     out_moments = m;
 #endif
