@@ -15,7 +15,11 @@ from typing import Any, NoReturn
 from errors import UserError, did_you_mean
 
 ROOT = Path(__file__).resolve().parent
-DENOISERS = ("none", "accumulate", "svgf", "bmfr", "reference")
+DENOISERS = (
+    *("none", "accumulate", "svgf", "asvgf", "bmfr"),
+    *("gaussian", "bilateral", "joint", "joint-separable", "atrous", "atrous-jitter", "guided"),
+    "reference",
+)
 LARGEST_SIDE = 16384
 SCENE_FILES = ".glb .gltf .obj .ply"
 
@@ -333,18 +337,102 @@ def bench_parser() -> Parser:
     parser = Parser(
         "app.py bench",
         "Measure every denoiser on the same traced frames: time, and error and flicker against references of 1024\n"
-        "paths per pixel; and the tracer's time. Prints tables and writes JSON. References are kept in .cache/: only\n"
-        "the first run takes long.",
-        "examples:\n  app.py bench --quick\n  app.py bench --scene cornell --out out/cornell.json",
+        "paths per pixel; path tracing in the same time; and the tracer's time. Prints tables, writes JSON and CSV.\n"
+        "References are kept in .cache/: only the first run takes long.",
+        "examples:\n  app.py bench --quick\n  app.py bench --html --size 320x180\n"
+        "  app.py bench --scene cornell --out out/cornell.json\n"
+        "  app.py bench --hard --out out/hard.json                     inputs on which formulas as printed fail",
     )
     parser.add_argument("--scene", action="append", metavar="S", help="repeatable (default: cornell and interior)")
     _add_environment(parser)
     parser.add_argument("--quick", action="store_true", help="small pictures, few samples: does it run, not how fast")
+    parser.add_argument(
+        "--hard",
+        action="store_true",
+        help="measure the hard cases instead (see docs/hard_cases.md): exact answer, error, what no care would give",
+    )
     parser.add_argument("--table", action="store_true", help="print tables: the default, for those who say so")
+    parser.add_argument(
+        "--html", action="store_true", help="also write a page with diagrams and pictures, OUT with suffix .html"
+    )
     _add_size(parser)
     parser.add_argument(
         "--out", type=Path, default=Path("out/bench.json"), metavar="JSON", help="default out/bench.json"
     )
+    _add_settings(parser)
+    return parser
+
+
+def frame_range(text: str) -> tuple[int | None, int | None]:
+    """``10:20`` to (10, 20); either may be left out. Raises UserError."""
+    match = re.fullmatch(r"(\d{1,9})?:(\d{1,9})?", text.strip(), re.ASCII)
+    if not match:
+        raise UserError(f"--frames {text}: must be A:B, from frame A up to frame B - 1, as in 10:20, 10: or :20")
+    first, end = (None if number is None else int(number) for number in match.groups())
+    return first, end
+
+
+def record_parser() -> Parser:
+    parser = Parser(
+        "app.py record",
+        "Record frames 0 to N-1 of a shot, and with --reference-spp converged references of them, to a folder in the\n"
+        "layout of the BMFR data set: noisy illumination, guides and camera matrices. app.py replay filters them.\n"
+        "Interrupted, it keeps what there is; the same command goes on. More --frames or paths continue as well.",
+        "examples:\n"
+        "  app.py record --frames 60 --out out/cornell\n"
+        "  app.py record --scene interior --animate --frames 24 --size 320x180 --reference-spp 1024 --out out/interior",
+    )
+    _add_scene(parser)
+    _add_size(parser)
+    parser.add_argument(
+        "--frames", type=whole("--frames", 1, 1_000_000), default=60, metavar="N", help="how many (default 60)"
+    )
+    parser.add_argument(
+        "--camera",
+        metavar="C",
+        help="still, flight, or the file of a camera path, see app.py render --help "
+        "(default: the scene's flight, still if it has none)",
+    )
+    parser.add_argument("--animate", action="store_true", help="objects and lamps move, where the scene has such")
+    parser.add_argument(
+        "--jitter", action="store_true", help="shift the camera within the pixel from frame to frame (default: not)"
+    )
+    parser.add_argument(
+        "--reference-spp",
+        type=whole("--reference-spp", 1, 10_000_000),
+        default=0,
+        metavar="M",
+        help="paths per pixel of a reference for each frame (default: no references)",
+    )
+    parser.add_argument(
+        "--out", type=Path, default=Path("out/recording"), metavar="DIR", help="folder (default out/recording)"
+    )
+    _add_seed(parser)
+    _add_settings(parser)
+    return parser
+
+
+def replay_parser() -> Parser:
+    parser = Parser(
+        "app.py replay",
+        "Filter recorded frames, without any scene: those of app.py record, or any in the layout of the BMFR data set\n"
+        "(docs/recording.md). Writes denoised{i}.exr (linear radiance), display{i}.png, timings.json and, where there\n"
+        "are references, metrics.json.",
+        "examples:\n"
+        "  app.py replay out/cornell\n"
+        "  app.py replay out/cornell --denoiser bmfr --frames 10:20 --out out/bmfr\n"
+        "  app.py replay out/cornell --window",
+    )
+    parser.add_argument("folder", type=Path, metavar="DIR", help="folder of the recording")
+    _add_denoiser(parser, DENOISERS[:-1], "what to filter with (default svgf)")
+    parser.add_argument(
+        "--frames", type=frame_range, default=(None, None), metavar="A:B", help="from A up to B - 1 (default: all)"
+    )
+    parser.add_argument("--out", type=Path, default=Path("out/replay"), metavar="DIR", help="default out/replay")
+    parser.add_argument(
+        "--window", action="store_true", help="play them in the window, again and again; writes nothing"
+    )
+    parser.add_argument("--log", action="store_true", help="with --window: print what changes in it")
     _add_settings(parser)
     return parser
 
@@ -370,6 +458,8 @@ COMMANDS: dict[str, tuple[str, Callable[[], Parser]]] = {
     "graph": ("print the passes of one frame, as text or Graphviz", graph_parser),
     "explain": ("say what a scene and a denoiser need, what it costs, and why", explain_parser),
     "bench": ("measure time and error of the denoisers", bench_parser),
+    "record": ("record frames and references to a folder", record_parser),
+    "replay": ("filter recorded frames, of this program or of others", replay_parser),
     "scenes": ("list the scenes that come with the program", scenes_parser),
     "doctor": ("say what is missing on this machine, and what to do", doctor_parser),
 }

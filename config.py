@@ -82,8 +82,19 @@ class Svgf(Section):
     color_clamp_sigma: float = param(
         1.0, 0, 10, "[0;10] reach of that bound around their mean, in their standard deviations"
     )
+    fast_clamp: bool = param(
+        False, doc="bound the accumulated colour by the mean of the last few frames around the pixel", structural=True
+    )
+    fast_frames: int = param(6, 1, 32, "[1;32] those last frames")
+    fast_sigma: float = param(2.0, 0, 10, "[0;10] reach of that bound, in their standard deviations")
     variance_guided: bool = param(
         True, doc="steer the luminance weight by the variance", structural=True, heading="variance"
+    )
+    variance: str = param(
+        "raw",
+        choices=("raw", "raw-mean", "welford", "welford-mean", "spatial", "spatial-temporal", "exaggerated"),
+        doc="how it is estimated: over time from raw or centred moments, in space, in both, or a hundredfold",
+        structural=True,
     )
     accumulated_variance: bool = param(
         True, doc="scale the variance to that of the accumulated colour after the first iteration", structural=True
@@ -100,7 +111,7 @@ class Svgf(Section):
     first_sigma_l: float = param(4.0, 0.1, 1000, "[0.1;1000] sigma_l of the first iteration, in sigma_l of the others")
     sigma_r: float = param(0.1, 0.001, 100, "[0.001;100] tolerance for roughness, of specular light only")
     reach: float = param(
-        100.0, 1, 1e6, "[1;1000000] distance over which specular light is averaged, pixels per squared roughness"
+        30.0, 1, 1e6, "[1;1000000] distance over which specular light is averaged, pixels per squared roughness"
     )
 
     @property
@@ -112,6 +123,38 @@ class Svgf(Section):
     def clamp(self) -> float | None:
         """``color_clamp_sigma``, None where the colour is not clamped."""
         return self.color_clamp_sigma if self.color_clamp else None
+
+
+@dataclass(frozen=True)
+class Asvgf(Svgf):
+    """Adaptive SVGF (Schied et al. 2018): everything that SVGF has, and temporal gradients that cut its history."""
+
+    preset: str = param(
+        "best", choices=("paper", "reference", "best"), doc="values for the keys of this section that are not set"
+    )
+    remember: str = param(
+        "random",
+        choices=("random", "brightest"),
+        doc="which pixel of 3x3 is shaded again in the next frame",
+        heading="gradients",
+    )
+    gradient_iterations: int = param(
+        3, 1, 8, "[1;8] à-trous iterations that spread the gradients over 3x3 pixels and more", structural=True
+    )
+    gradient_guided: bool = param(True, doc="let luminance steer how gradients are spread", structural=True)
+    gradient_sigma_l: float = param(4.0, 0.01, 1000, "[0.01;1000] tolerance for luminance there, in deviations of it")
+    gain: float = param(1.0, 0, 1000, "[0;1000] share of the history that is void, per relative change of light")
+    follow: bool = param(
+        True, doc="let the history follow the light, by the factor that gradients tell", structural=True
+    )
+    widen: bool = param(False, doc="take the largest such share of 3x3 neighbours", structural=True)
+    cut: str = param(
+        "harmonic",
+        choices=("harmonic", "power"),
+        doc="length left of a history: as the sample's weight implies, or a power of what is not void",
+        structural=True,
+    )
+    power: float = param(10.0, 0, 100, "[0;100] that power")
 
 
 @dataclass(frozen=True)
@@ -129,9 +172,21 @@ class Bmfr(Section):
         4.0, 0.5, 1000, "[0.5;1000] largest distance between points of a history, in widths of a pixel on the surface"
     )
     normal_tolerance: float = param(0.1, 0, 4, "[0;4] largest squared distance between normals of a history")
+    follow_motion: bool = param(
+        True, doc="look for the history of what moves where it was, not where it is now", structural=True
+    )
     round_history: bool = param(True, doc="round the history's length before it is used", structural=True)
     alpha: float = param(0.2, 0, 1, "[0;1] smallest share of the new frame before the fit; 0: running mean")
     alpha_fit: float = param(0.1, 0, 1, "[0;1] smallest share of the new fit; 0: running mean")
+    fast_clamp: bool = param(
+        False, doc="bound the accumulated colour by the mean of the last few frames around the pixel", structural=True
+    )
+    fast_frames: int = param(6, 1, 32, "[1;32] those last frames")
+    fast_sigma: float = param(2.0, 0, 10, "[0;10] reach of that bound, in their standard deviations")
+    adaptive: bool = param(
+        False, doc="cut both histories where light has changed, by A-SVGF's gradients and parameters", structural=True
+    )
+    gain: float = param(3.0, 0, 1000, "[0;1000] asvgf.gain of these histories, which are longer than A-SVGF's")
     fit: bool = param(
         True, doc="fit blocks by features; off: what was accumulated before", structural=True, heading="regression"
     )
@@ -152,6 +207,14 @@ class Bmfr(Section):
     caution: float = param(
         1.5, 0, 100, "[0;100] doubt in a part's own fit: variances that noise is expected to explain in each feature"
     )
+    short_history: int = param(
+        0,
+        0,
+        16,
+        "[0;16] frames: parts whose samples have fewer are doubted as fresh_caution says; 0: as all are",
+        structural=True,
+    )
+    fresh_caution: float = param(1.0, 0, 100, "[0;100] that doubt; less: smaller blocks where the history is short")
     unit_scale: bool = param(False, doc="scale positions to [0, 1] in every block, not to [-1, 1]", structural=True)
     regularization: str = param(
         "both",
@@ -175,6 +238,77 @@ class Bmfr(Section):
         """``part`` as far as the block can be cut so: the nearer of its half and its quarter, 0 if there are none."""
         sides = [self.block // n for n in (2, 4) if self.block % n == 0]
         return min(sides, key=lambda side: abs(side - self.part), default=0) if self.part else 0
+
+
+@dataclass(frozen=True)
+class Spatial(Section):
+    """What the filters in space have in common: when they blend over time, and the edges that stop them."""
+
+    demodulate: bool = param(True, doc="filter illumination, without the surfaces' albedo", structural=True)
+    temporal: bool = param(True, doc="accumulate over time", structural=True, heading="accumulation")
+    order: str = param(
+        "filter-first",
+        choices=("filter-first", "blend-first"),
+        doc="blend filtered frames over time, or filter what was blended",
+        structural=True,
+    )
+    alpha: float = param(0.1, 0, 1, "[0;1] smallest share of the new frame; 0: running mean")
+    max_history: int = param(255, 10, 255, "[10;255] longest history counted, in frames")
+    depth_tolerance: float = param(0.01, 0, 1, "[0;1] largest depth difference accepted in history, part of the depth")
+    normal_tolerance: float = param(0.9, -1, 1, "[-1;1] smallest cosine between normals accepted in history")
+    sigma_z: float = param(
+        1.0,
+        0.01,
+        100,
+        "[0.01;100] joint, à-trous: tolerance for depth, in depth slopes of the surface",
+        heading="edges",
+    )
+    sigma_n: int = param(128, 1, 1024, "[1;1024] joint, à-trous: exponent of the cosine between normals; more: sharper")
+
+
+@dataclass(frozen=True)
+class Gaussian(Section):
+    """Gaussian blur, which knows no edges."""
+
+    sigma_d: float = param(2.0, 0.5, 8, "[0.5;8] width, in pixels: standard deviation")
+    separable: bool = param(True, doc="rows, then columns: the same picture for fewer taps", structural=True)
+
+
+@dataclass(frozen=True)
+class Bilateral(Section):
+    """Bilateral filter (Tomasi and Manduchi 1998)."""
+
+    sigma_d: float = param(3.0, 0.5, 8, "[0.5;8] width, in pixels: standard deviation")
+    sigma_r: float = param(1.0, 0.001, 1000, "[0.001;1000] tolerance for colour, in radiance of a white surface")
+
+
+@dataclass(frozen=True)
+class Joint(Section):
+    """Joint bilateral filter (Petschnigg et al. 2004, Eisemann and Durand 2004), whole or approximated separably."""
+
+    sigma_d: float = param(4.0, 0.5, 8, "[0.5;8] width, in pixels: standard deviation")
+
+
+@dataclass(frozen=True)
+class Atrous(Section):
+    """Edge-avoiding à-trous wavelet with tolerances set by hand (Dammertz et al. 2010), all taps or some of them."""
+
+    iterations: int = param(5, 0, 8, "[0;8] à-trous iterations; number i takes every 2^i-th pixel", structural=True)
+    sigma_l: float = param(
+        1.0, 0.001, 1000, "[0.001;1000] tolerance for luminance in the first iteration, in radiance of a white surface"
+    )
+    halve: bool = param(True, doc="halve the tolerance for luminance in every iteration")
+    taps: int = param(8, 1, 24, "[1;24] atrous-jitter: taps of an iteration besides the centre", structural=True)
+
+
+@dataclass(frozen=True)
+class Guided(Section):
+    """Guided filter (He et al. 2010, Bauszat et al. 2011)."""
+
+    radius: int = param(8, 1, 32, "[1;32] half a window's side, in pixels")
+    epsilon: float = param(
+        0.01, 1e-6, 1, "[1e-06;1] doubt in the guides: variance of a guide below which it says little"
+    )
 
 
 @dataclass(frozen=True)
@@ -226,7 +360,14 @@ class Config:
     render: Render = field(default_factory=Render)
     firefly: Firefly = field(default_factory=Firefly)
     svgf: Svgf = field(default_factory=Svgf)
+    asvgf: Asvgf = field(default_factory=Asvgf)
     bmfr: Bmfr = field(default_factory=Bmfr)
+    spatial: Spatial = field(default_factory=Spatial)
+    gaussian: Gaussian = field(default_factory=Gaussian)
+    bilateral: Bilateral = field(default_factory=Bilateral)
+    joint: Joint = field(default_factory=Joint)
+    atrous: Atrous = field(default_factory=Atrous)
+    guided: Guided = field(default_factory=Guided)
     taa: Taa = field(default_factory=Taa)
     display: Display = field(default_factory=Display)
     surroundings: Surroundings = field(default_factory=Surroundings)
@@ -236,7 +377,14 @@ SECTIONS: dict[str, type[Section]] = {
     "render": Render,
     "firefly": Firefly,
     "svgf": Svgf,
+    "asvgf": Asvgf,
     "bmfr": Bmfr,
+    "spatial": Spatial,
+    "gaussian": Gaussian,
+    "bilateral": Bilateral,
+    "joint": Joint,
+    "atrous": Atrous,
+    "guided": Guided,
     "taa": Taa,
     "display": Display,
 }
@@ -283,6 +431,7 @@ PRESETS: dict[str, dict[str, dict[str, Value]]] = {
     "bmfr": {
         # Koskela et al. 2019: preprocessing, feature fitting, postprocessing.
         "paper": {
+            "follow_motion": False,
             "round_history": True,
             "alpha": 0.2,
             "alpha_fit": 0.1,
@@ -298,6 +447,7 @@ PRESETS: dict[str, dict[str, dict[str, Value]]] = {
         },
         # The authors' OpenCL code, where it differs from the paper.
         "reference": {
+            "follow_motion": False,
             "round_history": False,
             "alpha": 0.2,
             "alpha_fit": 0.1,
@@ -314,6 +464,35 @@ PRESETS: dict[str, dict[str, dict[str, Value]]] = {
         # What measured best in error at equal time on flights through both scenes (docs/bmfr.md).
         "best": {"part": 16, "regularization": "both"},
     },
+}
+PRESETS["asvgf"] = {
+    # Schied et al. 2018, on top of their SVGF.
+    "paper": {
+        **PRESETS["svgf"]["paper"],
+        "remember": "random",
+        "gradient_iterations": 5,
+        "gradient_guided": True,
+        "gain": 1.0,
+        "follow": False,
+        "widen": False,
+        "cut": "harmonic",
+    },
+    # The authors' own renderer (q2vkpt), as far as it is A-SVGF.
+    "reference": {
+        **PRESETS["svgf"]["paper"],
+        "separate": False,
+        "alpha": 0.075,
+        "alpha_moments": 0.1,
+        "remember": "random",
+        "gradient_iterations": 5,
+        "gradient_guided": True,
+        "gain": 1.0,
+        "follow": False,
+        "widen": True,
+        "cut": "harmonic",
+    },
+    # What measured best in moving and in still light (docs/asvgf.md).
+    "best": {**PRESETS["svgf"]["best"], "gradient_iterations": 3, "gain": 1.0, "follow": True},
 }
 """section -> value of its ``preset`` key -> values of the keys it owns. A key set by file or ``--set`` wins over it.
 

@@ -14,13 +14,14 @@ from functools import cached_property
 from typing import Final
 
 from config import Config
-from gl.pipelines import DENOISERS, FrameTraits, build
+from gl.pipelines import DENOISERS, FrameTraits, build, remembered
 from gl.plan import Memory, Plan
 from gl.switches import DENOISER, TRAIT, Effect, effects, nearest, reasons, ways
 from gl.upload import PREFIX
 from parameter import Value
 from raytrace.compiled import CompiledScene
-from raytrace.features import compiled_in, content_of, images_of, rays_of
+from raytrace.features import GRADIENT, compiled_in, content_of, images_of, rays_of
+from raytrace.frame import STRATUM
 from raytrace.integrator import Tracer
 from raytrace.scene import Scene
 from session import find_scene, prepare_tracer, tell_notices
@@ -45,7 +46,8 @@ WORDS: Final = {
 """What the switches of kernels and kinds of scenes mean; one that is not here goes by its own name."""
 
 _FEW: Final = 3
-"""So many readers of an image are named; of more only the number is given."""
+_READERS_WIDTH: Final = 70
+"""So many readers of an image are named, in so many letters; of more only the number is given."""
 
 _WIDTH: Final = 118
 _INDENT: Final = 40  # where the names of textures begin, or later
@@ -73,6 +75,11 @@ class Subject:
         pixel = self.scene.scene.camera.pixel_size(self.size[1])
         images = self.tracer.images
         return FrameTraits(moving="prev_normal" in images, specular="specular" in images, pixel_size=pixel)
+
+    @property
+    def images(self) -> tuple[str, ...]:
+        """Names of the images that frames for the denoiser will have."""
+        return (*self.tracer.images, *([GRADIENT] if remembered(self.config, self.denoiser) else []))
 
     @cached_property
     def plan(self) -> Plan:
@@ -160,6 +167,9 @@ def tracer_section(subject: Subject) -> list[str]:
         rows += [("kernel", _name(kernel), first), *(("", "", line) for line in more)]
     scenes = "two scenes, that of what moves built anew every frame" if tracer.variant.moving else "one scene"
     rows.append(("Embree", tracer.rays.name, scenes))
+    rule = remembered(config, subject.denoiser)
+    place = f"1 in {STRATUM}x{STRATUM} pixels, {rule}; no ray more"
+    rows.append(("sample", "carried over", place if rule else "none: the method does not ask for any"))
     wish = f"render.jitter = {_value(config.render.jitter)}"
     state = State(config, subject.denoiser)
     headless = subject.jitter or config.render.jitter == "on"
@@ -175,14 +185,14 @@ def image_section(subject: Subject) -> list[str]:
     """What the tracer makes of a frame, and what of it is uploaded."""
     plan, tracer = subject.plan, subject.tracer
     uploads = {row.names[0].removeprefix(PREFIX): row for row in plan.memory(subject.size) if row.kind == "import"}
-    known = images_of(type(tracer.variant)(*(True for _ in tracer.variant)), positions=True)
+    known = images_of(type(tracer.variant)(*(True for _ in tracer.variant)), positions=True, gradients=True)
     rows: list[tuple[str, ...]] = []
     for name in dict.fromkeys((*known, *uploads)):
         if name in uploads:
             row = uploads[name]
-            made = "uploaded" if name in tracer.images else "uploaded, given beside the frame"
+            made = "uploaded" if name in subject.images else "uploaded, given beside the frame"
             rows.append((name, f"{row.fmt} {_by(row.size)}", f"{row.bytes:,}", f"{made}; {_readers(plan, name)}"))
-        elif name in tracer.images:
+        elif name in subject.images:
             rows.append((name, "", "0", "made, not uploaded: no pass reads it"))
         else:
             rows.append((name, "", "0", f"not made: {_why_not_made(tracer, name)}"))
@@ -288,7 +298,9 @@ def _readers(plan: Plan, image: str) -> str:
     names = [node.name for node in plan.passes if any(tex.name == PREFIX + image for tex in node.reads.values())]
     if not names:
         return "handed on as it is"
-    return f"read by {', '.join(names) if len(names) <= _FEW else f'{len(names)} passes'}"
+    listed = ", ".join(names)
+    short = len(names) <= _FEW and len(listed) <= _READERS_WIDTH
+    return f"read by {listed if short else f'{len(names)} passes'}"
 
 
 def _why_not_made(tracer: Tracer, image: str) -> str:

@@ -16,7 +16,7 @@ from console import Progress
 from errors import UserError, did_you_mean
 from gl.context import create_headless
 from gl.executor import Result
-from gl.pipelines import FrameTraits, build
+from gl.pipelines import FrameTraits, build, remembered
 from gl.renderer import Renderer, read
 from images import to_srgb8, viewable, write_exr, write_png
 from raytrace.frame import FramePacket
@@ -71,6 +71,7 @@ def render(job: RenderJob, config: Config) -> None:
     with ExitStack() as stack:
         renderer = open_renderer((config.render.width, config.render.height), stack)
         shot = open_shot(job.scene, config, job.camera, job.animate, job.jitter)
+        shot.remember = remembered(config, job.denoiser)
         stack.enter_context(shot.tracer)
         _require_texture(job, config, shot)
         with telling_of_memory(renderer, shot.size):

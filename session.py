@@ -120,12 +120,18 @@ def open_tracer(
 
 
 def open_shot(
-    name: str, config: Config, camera: str | None, animate: bool, jitter: bool = False, log: Log | None = None
+    name: str,
+    config: Config,
+    camera: str | None,
+    animate: bool,
+    jitter: bool = False,
+    log: Log | None = None,
+    positions: bool = False,
 ) -> Shot:
     """Everything between a scene's name and its frames. Progress and the loader's notices go to ``log``, or to stderr.
 
     ``camera``: "still", "flight", the name of one of the scene's cameras, the file of a camera path, or None for the
-    flight if the scene has one.
+    flight if the scene has one. ``positions``: frames carry world positions.
     Raises UserError for a scene or camera that cannot be had, and for a picture that memory has no room for.
     """
     log = log or Terminal()
@@ -135,7 +141,7 @@ def open_shot(
         scene = find_scene(name, animate, config.surroundings)
     tell_notices(scene, animate, log)
     path = _camera_path(scene, camera)
-    compiled, tracer = open_tracer(scene, config, log=log)
+    compiled, tracer = open_tracer(scene, config, positions, log)
     return Shot(compiled, tracer, size, path, animate, jitter)
 
 

@@ -71,7 +71,7 @@ class Reference:
         return first, second
 
     @property
-    def _share(self) -> float:
+    def share(self) -> float:
         """Standard deviation of the mean over that of the difference of the halves."""
         return float(np.sqrt(self.counts[0] * self.counts[1])) / self.samples
 
@@ -79,7 +79,7 @@ class Reference:
         """Estimated RMSE of the reference itself on the pixels of ``mask``, linear radiance."""
         first, second = self.halves(packet)
         difference = (first - second)[mask]
-        return float(np.sqrt(np.mean(difference * difference))) * self._share
+        return float(np.sqrt(np.mean(difference * difference))) * self.share
 
 
 def _modulated(illumination: F64, packet: FramePacket) -> F64:
@@ -95,7 +95,7 @@ def temporal_noise(now: tuple[Reference, FramePacket], before: tuple[Reference, 
     """
     first, second = now[0].halves(now[1])
     first_before, second_before = before[0].halves(before[1])
-    return temporal_difference(first, first_before, second, second_before, mask) * now[0]._share
+    return temporal_difference(first, first_before, second, second_before, mask) * now[0].share
 
 
 class ReferenceCache:

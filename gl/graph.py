@@ -78,8 +78,11 @@ class Graph:
         self._fed: dict[Tex, History] = {}
         self._outputs: dict[str, Tex] = {}
 
-    def import_(self, name: str, fmt: str) -> Tex:
+    def import_(self, name: str, fmt: str, divisor: int = 1) -> Tex:
         """A texture that is uploaded before the frame. Asking again for ``name`` returns the same handle.
+
+        Args:
+            divisor: its size is the frame's divided by this, rounded up.
 
         Raises:
             GraphError: unknown format, another format than before, or a pass already writes a texture of this name.
@@ -87,7 +90,7 @@ class Graph:
         _check_format(f"import {name!r}", fmt)
         tex = self._textures.get(name)
         if tex is None:
-            return self._texture(name, fmt, 1, IMPORT)
+            return self._texture(name, fmt, divisor, IMPORT)
         if tex.producer != IMPORT or tex.fmt != fmt:
             owner = "an import" if tex.producer == IMPORT else f"written by {self._nodes[tex.producer].name!r}"
             raise GraphError(f"import {name!r} as {fmt}: a texture of that name is already there ({owner}, {tex.fmt})")

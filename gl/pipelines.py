@@ -8,26 +8,47 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from config import Config, Display
+from config import Config, Display, Svgf
 from gl.graph import Graph, Tex
 from gl.passes import display
+from gl.passes.asvgf import asvgf, change_of
 from gl.passes.bad_pixels import mark_bad
 from gl.passes.bmfr import View, bmfr, part_count, thread_count
 from gl.passes.exposure import auto_exposure
 from gl.passes.firefly import reject_fireflies
+from gl.passes.spatial import SPATIAL, spatial
 from gl.passes.svgf import svgf
 from gl.passes.taa import taa
 from gl.passes.temporal import Guides, accumulate, reproject
-from raytrace.frame import STANDARD_BASIS, Basis, FramePacket
+from raytrace.frame import STANDARD_BASIS, STILL, Basis, CameraStep, FramePacket
 
 DENOISERS = {
     "none": "the noisy frame, one path per pixel",
     "accumulate": "temporal accumulation alone",
     "svgf": "spatiotemporal variance-guided filtering (Schied et al. 2017)",
+    "asvgf": "adaptive SVGF, which forgets light that has changed (Schied et al. 2018)",
     "bmfr": "blockwise multi-order feature regression (Koskela et al. 2019)",
+    "gaussian": "Gaussian blur",
+    "bilateral": "bilateral filter (Tomasi and Manduchi 1998)",
+    "joint": "joint bilateral filter on depth and normals (Petschnigg et al. 2004)",
+    "joint-separable": "the same, approximated by rows and columns",
+    "atrous": "à-trous wavelet with edges set by hand (Dammertz et al. 2010)",
+    "atrous-jitter": "the same with fewer taps, drawn at random",
+    "guided": "guided filter on depth and normals (He et al. 2010, Bauszat et al. 2011)",
     "reference": "mean of many paths per pixel of the same frame",
 }
 """Name -> what it is. In the order of the window's keys."""
+
+SECTIONS_OF: dict[str, tuple[str, ...]] = {
+    "none": (),
+    "accumulate": ("svgf",),
+    "svgf": ("svgf",),
+    "asvgf": ("asvgf",),
+    "bmfr": ("bmfr",),
+    **{denoiser: (denoiser.partition("-")[0], "spatial") for denoiser in SPATIAL},
+    "reference": (),
+}
+"""Denoiser -> the configuration's sections that are its own, that with most of its parameters first."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +57,7 @@ class FrameTraits:
 
     ``moving``: objects move, so there is a ``frame.prev_normal``. ``specular``: something is metallic or glossy, so
     there are a ``frame.specular`` and a ``frame.specular_albedo``. ``pixel_size``: scene units a pixel is wide at depth
-    1. ``basis``, ``jitter``, ``index``: as in the :class:`FramePacket`. ``software``: the renderer
+    1. ``basis``, ``jitter``, ``index``, ``camera_step``: as in the :class:`FramePacket`. ``software``: the renderer
     runs on the CPU.
     """
 
@@ -47,6 +68,7 @@ class FrameTraits:
     index: int = 0
     software: bool = True
     specular: bool = False
+    camera_step: CameraStep | None = STILL
 
     @staticmethod
     def of(packet: FramePacket, software: bool = True) -> FrameTraits:
@@ -59,7 +81,12 @@ class FrameTraits:
             index=packet.index,
             software=software,
             specular=packet.specular is not None,
+            camera_step=packet.camera_step,
         )
+
+
+Builder = Callable[[Graph, Config, FrameTraits], Tex]
+"""Adds a denoiser to a graph and returns the radiance."""
 
 
 class Signals:
@@ -124,10 +151,28 @@ def _accumulate(g: Graph, config: Config, traits: FrameTraits) -> Tex:
 
 
 def _svgf(g: Graph, config: Config, traits: FrameTraits) -> Tex:
-    s, p = Signals(g, config, traits), config.svgf
-    guides = Guides(g, traits.moving)
+    p = config.svgf
+
+    def work(signals: dict[str, Tex], s: Signals) -> dict[str, Tex]:
+        return svgf(g, signals, Guides(g, traits.moving), p, traits.pixel_size, specular_albedo=s.specular_albedo)
+
+    return _by_signals(g, Signals(g, config, traits), p, work)
+
+
+def _asvgf(g: Graph, config: Config, traits: FrameTraits) -> Tex:
+    p = config.asvgf
+
+    def work(signals: dict[str, Tex], s: Signals) -> dict[str, Tex]:
+        noisy, guides = (s.direct, s.indirect), Guides(g, traits.moving)
+        return asvgf(g, signals, noisy, guides, p, traits.pixel_size, s.specular_albedo)
+
+    return _by_signals(g, Signals(g, config, traits), p, work)
+
+
+def _by_signals(g: Graph, s: Signals, p: Svgf, work: Callable[[dict[str, Tex], Signals], dict[str, Tex]]) -> Tex:
+    """Split the light into the signals that ``p`` wants, let ``work`` filter them, and put them together again."""
     if not p.separate:
-        clean = svgf(g, {"both": s.together(g, p.demodulate)}, guides, p, traits.pixel_size)["both"]
+        clean = work({"both": s.together(g, p.demodulate)}, s)["both"]
         albedos = s.albedos if p.demodulate else {}
         return display.modulate(g, in_direct=clean, in_emission=s.emission, **albedos)
     signals, albedos = named(direct=s.direct, indirect=s.indirect, specular=s.specular), s.albedos
@@ -138,8 +183,7 @@ def _svgf(g: Graph, config: Config, traits: FrameTraits) -> Tex:
             for name, noisy in signals.items()
         }
         albedos = {}
-    filtered = svgf(g, signals, guides, p, traits.pixel_size, s.specular_albedo)
-    clean_signals = {f"in_{name}": texture for name, texture in filtered.items()}
+    clean_signals = {f"in_{name}": texture for name, texture in work(signals, s).items()}
     return display.modulate(g, **clean_signals, in_emission=s.emission, **albedos)
 
 
@@ -148,7 +192,8 @@ def _bmfr(g: Graph, config: Config, traits: FrameTraits) -> Tex:
     if not traits.specular:  # one roughness for all: a second constant
         p = replace(p, features=",".join(name for name in p.features.split(",") if name != "roughness"))
     threads = thread_count(p.features, traits.software, part_count(p))
-    view = View(traits.basis, traits.jitter, traits.pixel_size, traits.index, threads)
+    step = None if p.follow_motion or not traits.moving else traits.camera_step
+    view = View(traits.basis, traits.jitter, traits.pixel_size, traits.index, threads, step)
     guides, features = Guides(g, traits.moving), named(albedo=s.albedo, roughness=s.specular_albedo)
     signals, albedos = {"direct": s.direct, "indirect": s.indirect}, s.albedos
     second: dict[str, Tex] = {}
@@ -158,19 +203,40 @@ def _bmfr(g: Graph, config: Config, traits: FrameTraits) -> Tex:
         second["in_specular"] = bmfr(g, {"direct": s.specular}, features, guides, p, view, "bmfr.specular")
     elif s.specular is not None:
         signals = {"direct": s.together(g)}
-    clean = bmfr(g, signals, features, guides, p, view)
+    change = None
+    if p.adaptive and p.temporal:
+        with g.scope("bmfr"):
+            gradients = replace(config.asvgf, gain=p.gain)
+            change = change_of(g, s.direct, s.indirect, guides, gradients, traits.pixel_size, joint=True)
+    clean = bmfr(g, signals, features, guides, p, view, change=change)
     return display.modulate(g, in_direct=clean, in_emission=s.emission, **second, **albedos)
+
+
+def _spatial(denoiser: str) -> Builder:
+    """What builds a filter in space, by its name."""
+
+    def builder(g: Graph, config: Config, traits: FrameTraits) -> Tex:
+        s, demodulate = Signals(g, config, traits), config.spatial.demodulate
+        noisy = {"in_direct": s.direct, "in_indirect": s.indirect, **({} if demodulate else {"in_albedo": s.albedo})}
+        if s.gloss:
+            noisy = {"in_direct": s.together(g, demodulate)}
+        clean = spatial(g, denoiser, noisy, Guides(g, traits.moving), config, traits.pixel_size, traits.index)
+        return display.modulate(g, in_direct=clean, in_emission=s.emission, **(s.albedos if demodulate else {}))
+
+    return builder
 
 
 def _reference(g: Graph, config: Config, traits: FrameTraits) -> Tex:
     return g.import_("frame.reference", "rgba32f")
 
 
-_BUILDERS: dict[str, Callable[[Graph, Config, FrameTraits], Tex]] = {
+_BUILDERS: dict[str, Builder] = {
     "none": _none,
     "accumulate": _accumulate,
     "svgf": _svgf,
+    "asvgf": _asvgf,
     "bmfr": _bmfr,
+    **{denoiser: _spatial(denoiser) for denoiser in SPATIAL},
     "reference": _reference,
 }
 
@@ -201,6 +267,14 @@ def build(config: Config, denoiser: str, traits: FrameTraits, split: bool = Fals
     if split:
         g.output("noisy", _noisy(g, p, traits, exposure))
     return g
+
+
+def remembered(config: Config, denoiser: str) -> str:
+    """Which pixels the tracer is to remember for ``denoiser``: one of :data:`raytrace.gradients.RULES`, "" for none."""
+    wanted = {"asvgf": config.asvgf.temporal, "bmfr": config.bmfr.adaptive and config.bmfr.temporal}.get(
+        denoiser, False
+    )
+    return config.asvgf.remember if wanted else ""
 
 
 def _samples(g: Graph, traits: FrameTraits) -> dict[str, Tex]:

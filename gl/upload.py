@@ -8,7 +8,8 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from raytrace.frame import FramePacket
+from gl.plan import texture_size
+from raytrace.frame import STRATUM, FramePacket
 
 PREFIX = "frame."
 
@@ -24,6 +25,10 @@ class Uploader:
         """Write those images of ``packet`` that a plan imports, ``frame.direct`` being ``packet.direct``."""
         for name in names:
             values = getattr(packet, name.removeprefix(PREFIX), None)
+            if values is None and name == f"{PREFIX}temporal_gradient":
+                # A frame that was traced before anybody asked for gradients: nothing is known to have changed.
+                across, down = texture_size(packet.size, STRATUM)
+                values = np.zeros((down, across, 4), np.float32)
             if values is not None:
                 self.write(name, values)
 

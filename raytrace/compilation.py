@@ -24,6 +24,8 @@ SOURCES = (
     "directional_albedo",
     "embree_native",
     "embree_run",
+    "frame",
+    "gradients",
     "guides",
     "kernels",
     "kernels_glossy",

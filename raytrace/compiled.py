@@ -120,6 +120,16 @@ class CompiledScene:
         parts = [_records(mesh, self.origin, time) for mesh in self.scene.meshes if mesh.motion is not None]
         return np.concatenate(parts)
 
+    def dim(self, time: float, share: float) -> None:
+        """Write the emission at ``time`` (seconds), ``share`` of what the dimmers leave.
+
+        The lights' probabilities stay those of full power: the random numbers of a path then choose the same light
+        whatever its dimmer does, as temporal gradients need it.
+        """
+        for row, material in zip(self.emission, self.scene.materials, strict=True):
+            dimmed = share if material.dimmer is None else share * material.dimmer(time)
+            row[:] = np.array(material.emission, np.float32) * np.float32(dimmed)
+
     def moving_box(self) -> F32:
         """Bounds of the moving triangles as they are now, (2, 3) float32, widened against rounding."""
         corners = self.triangles[self.static_count :, :9].reshape(-1, 3)

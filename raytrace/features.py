@@ -19,10 +19,14 @@ ILLUMINATION = ("direct", "indirect", "specular")
 """The images of a frame with noise; all others come from the guide kernel."""
 
 
-def images_of(variant: Variant, positions: bool) -> tuple[str, ...]:
+GRADIENT = "temporal_gradient"
+"""The image with what is known of the change since the last frame; made for a frame whose method asks for it."""
+
+
+def images_of(variant: Variant, positions: bool, gradients: bool = False) -> tuple[str, ...]:
     """Names of the images that frames have in scenes of this kind; a :class:`FramePacket` has None for the others.
 
-    ``positions``: the surface points are asked for as well.
+    ``positions``: the surface points are asked for as well. ``gradients``: temporal gradients are.
     """
     needed = {
         "prev_normal": variant.moving,
@@ -31,7 +35,8 @@ def images_of(variant: Variant, positions: bool) -> tuple[str, ...]:
         "specular": variant.specular,
         "specular_albedo": variant.specular,
     }
-    return tuple(name for name in (*ILLUMINATION, *Outputs._fields) if needed.get(name, True))
+    images = (name for name in (*ILLUMINATION, *Outputs._fields) if needed.get(name, True))
+    return (*images, *((GRADIENT,) if gradients else ()))
 
 
 def rays_of(scene: CompiledScene) -> dict[str, int]:

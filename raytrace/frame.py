@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +17,19 @@ Basis = tuple[Vector, Vector, Vector]
 STANDARD_BASIS: Basis = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, -1.0))
 """Right, up and forward of a camera that looks along -z."""
 
+CameraStep = tuple[Basis, Vector]
+"""Rows of a rotation, and a shift, scene units, that together bring a point from a frame's camera space (right, up and
+forward of the camera) to that of the frame before."""
+
+STILL: CameraStep = (((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), (0.0, 0.0, 0.0))
+"""That of a camera that stands still."""
+
 MISS = -1.0
 """Object id of a pixel whose camera ray leaves the scene."""
+
+
+STRATUM: Final = 3
+"""Side in pixels of the squares that have one temporal gradient each."""
 
 
 @dataclass(frozen=True)
@@ -26,12 +38,19 @@ class FramePacket:
 
     With noise:
 
-    ``direct``, ``indirect`` (H, W, 4): rgb = illumination divided by the albedo ("demodulated"), linear; a unused (1).
+    ``direct``, ``indirect`` (H, W, 4): rgb = illumination divided by the albedo ("demodulated"), linear; a unused (1),
+    except in ``direct`` of a frame with temporal gradients: 0 where the sample was carried over from the last frame, 2
+    where it may be carried into the next one.
     Direct holds the light sample of the first hit and light sources hit by the bounce ray, combined by multiple
     importance sampling; indirect is what arrives over one bounce. 0 where the camera ray misses. Both are what the
     diffuse part of the surface reflects.
     ``specular`` (H, W, 4): rgb = what its specular part reflects of both, divided by ``specular_albedo``; 0 where there
     is none. None in a scene without metals and gloss, as is ``specular_albedo``.
+
+    ``temporal_gradient`` (ceil(H / 3), ceil(W / 3), 4): by how much the light has changed since the last frame, one
+    surface point for each 3x3 pixels: luminance of the direct light now minus then, and the larger of the two; the same
+    for indirect light. All 0 where there is none; exactly 0 in the differences where nothing changed. None unless asked
+    for.
 
     Without noise (guides):
 
@@ -55,6 +74,7 @@ class FramePacket:
     ``basis``: the camera's right, up and forward unit vectors, world space. The ray of pixel (x, y) goes along
     forward + pixel_size ((x + 1/2 + jitter_x - width / 2) right + (y + 1/2 + jitter_y - height / 2) up), and meets the
     surface, relative to the camera, at depth times that.
+    ``camera_step``: how the camera has moved; None: not known.
     ``timings``: seconds of wall time by stage name, of the tracer's own clock.
     """
 
@@ -70,6 +90,7 @@ class FramePacket:
     prev_normal: F32 | None = None
     position: F32 | None = None
     prev_position: F32 | None = None
+    temporal_gradient: F32 | None = None
     specular: F32 | None = None
     specular_albedo: F32 | None = None
     scene: str = ""
@@ -78,6 +99,7 @@ class FramePacket:
     pixel_size: float = 0.0
     basis: Basis = STANDARD_BASIS
     jitter: tuple[float, float] = (0.0, 0.0)
+    camera_step: CameraStep | None = None
     timings: dict[str, float] = field(default_factory=dict)
 
     @property

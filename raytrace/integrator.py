@@ -12,8 +12,9 @@ import itertools
 import os
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,11 +22,12 @@ from numpy.typing import NDArray
 
 from raytrace import kernels, kernels_glossy
 from raytrace.camera import Camera
-from raytrace.compiled import OBJECT, CompiledScene
+from raytrace.compiled import CompiledScene
 from raytrace.cutouts import CutoutCaster, cutouts_of
 from raytrace.embree import open_caster
 from raytrace.features import ILLUMINATION, images_of
-from raytrace.frame import FramePacket
+from raytrace.frame import STRATUM, FramePacket
+from raytrace.gradients import Memory, Moment, Reshading
 from raytrace.guides import Outputs, camera_rays, guide_kernel
 from raytrace.lights import SHADOW_END
 from raytrace.sampling import HALTON, HASH
@@ -37,8 +39,10 @@ I32 = NDArray[np.int32]
 U32 = NDArray[np.uint32]
 
 REFERENCE_SEED = 0x5EED0000
-"""Added to the run's seed for references, whose frame numbers moreover start at 2^31: they draw other numbers than any
-frame does."""
+"""Added to the run's seed for references, whose frame numbers moreover start at :data:`FIRST_SAMPLE`: they draw other
+numbers than any frame does."""
+
+FIRST_SAMPLE = 1 << 31
 
 
 _identities = itertools.count(1)
@@ -129,7 +133,8 @@ class Settings:
     """How frames are traced. ``generator``: HALTON or HASH; ``threads`` 0 = one per core; ``tile`` pixels per tile;
     ``positions``: frames carry world positions; ``backend``: see :func:`raytrace.embree.open_caster`; ``regularize``:
     narrow lobes are widened at a path's second hit, never in references; ``separable``: Smith's masking in its older,
-    separable form, as some renderers have it."""
+    separable form, as some renderers have it; ``also``: features (fields of :class:`Variant`) compiled in although the
+    scene lacks them, to measure what that costs."""
 
     seed: int = 0
     generator: int = HALTON
@@ -139,25 +144,25 @@ class Settings:
     backend: str = "auto"
     regularize: bool = True
     separable: bool = False
+    also: tuple[str, ...] = ()
 
 
 class Tracer:
     """Traces one compiled scene. ``with Tracer(...)`` or :meth:`close` ends its threads.
 
-    ``variant``: what is compiled in, if that is to be more than the scene needs. ``images``: names of those its frames
-    have. ``scene_id``: their number, which no other tracer of this process gives.
+    ``images``: names of those its frames have. ``scene_id``: their number, which no other tracer of this process gives.
     """
 
-    def __init__(self, scene: CompiledScene, settings: Settings | None = None, variant: Variant | None = None) -> None:
+    def __init__(self, scene: CompiledScene, settings: Settings | None = None) -> None:
         self.scene = scene
         self.settings = settings or Settings()
-        self.variant: Variant = variant or variant_of(scene)
+        self.variant: Variant = variant_of(scene)._replace(**dict.fromkeys(self.settings.also, True))
         self.images = images_of(self.variant, self.settings.positions)
         self.scene_id = next(_identities)
         self.rays = open_caster(scene.triangles, scene.static_count, self.settings.backend)
-        if (holes := cutouts_of(scene)) is not None:
-            self.rays = CutoutCaster(self.rays, holes)
-        self.tables = tables_of(scene)
+        if self.variant.cutout:
+            self.rays = CutoutCaster(self.rays, cutouts_of(scene))
+        self.tables = tables_of(scene, self.variant)
         self._guides = guide_kernel(self.variant, self.settings.positions)
         self._detailed = self.variant.specular or self.variant.bumps
         if self._detailed:
@@ -167,9 +172,11 @@ class Tracer:
             self._first_hit = kernels.first_hit_kernel(self.variant)
             self._second_hit = kernels.second_hit_kernel(self.variant)
         self._scratch = _Scratch()
+        self._memory = Memory()
         self.threads = self.settings.threads or len(os.sched_getaffinity(0))
         self._pool = ThreadPoolExecutor(self.threads, "trace") if self.threads > 1 else None
         self._time: tuple[float, float] | None = (0.0, 0.0) if not scene.moves else None
+        self._lamps: tuple[float, float] | None = None
 
     @property
     def kernels(self) -> tuple[Callable[..., object], ...]:
@@ -187,6 +194,13 @@ class Tracer:
             self._pool.shutdown()
         self.rays.close()
 
+    def carry_positions(self, wanted: bool) -> None:
+        """Whether frames from now on have world positions, whatever the settings said; not while one is traced."""
+        if wanted != self.settings.positions:
+            self.settings = replace(self.settings, positions=wanted)
+            self.images = images_of(self.variant, wanted)
+            self._guides = guide_kernel(self.variant, wanted)
+
     def warm_up(self) -> None:
         """Compile, or load from the disk cache, every kernel that frames of this scene need."""
         camera = self.scene.scene.camera
@@ -194,8 +208,14 @@ class Tracer:
         if self.scene.has_motion:
             self.set_time(0.0, 0.0)
 
-    def set_time(self, now: float, previous: float) -> None:
-        """Move what moves to time ``now``; the previous positions are those at ``previous`` (seconds)."""
+    def set_time(self, now: float, previous: float, lamps: float = 1.0) -> None:
+        """Move what moves to time ``now``; the previous positions are those at ``previous`` (seconds).
+
+        Lamps shine as their dimmers are at ``now``, times ``lamps``.
+        """
+        if self._lamps != (now, lamps):
+            self.scene.dim(now, lamps)
+            self._lamps = (now, lamps)
         if self.scene.moves and self._time != (now, previous):
             self.scene.move_to(now, previous)
             if self.scene.has_motion:
@@ -219,8 +239,8 @@ class Tracer:
             triangle, u, v = self.rays.intersect_rows(origins, directions, view.size[0])
         else:
             triangle, u, v = self.rays.intersect(origins, directions)
-        # Index -1 of a miss picks some object; it is overwritten where that matters.
-        objects = np.where(triangle >= 0, self.scene.triangle_info[triangle, OBJECT], np.int32(-1))
+        objects = np.empty(count, np.int32)
+        kernels.objects_of(triangle, self.scene.triangle_info, objects)
         return Hits(triangle, u, v, objects), directions
 
     def shade(
@@ -250,8 +270,8 @@ class Tracer:
         s = self._scratch
         s.reserve(count)
         settings = self.settings
-        direct[:, :3] = 0.0
-        indirect[:, :3] = 0.0
+        kernels.clear(direct)
+        kernels.clear(indirect)
         shadows, bounces = self._first_hit(
             self.tables, hits.triangle, hits.u, hits.v, eye, seeds.pixel, seeds.frame, settings.seed,
             settings.generator, s.shadow_o, s.shadow_d, s.index, s.light, s.bounce_o, s.bounce_d, s.bounce_index,
@@ -278,7 +298,7 @@ class Tracer:
         s.reserve_glossy(count)
         gloss = _NO_GLOSS if specular is None else specular
         for image in (direct, indirect, gloss):
-            image[:, :3] = 0.0
+            kernels.clear(image)
         shadows, bounces = self._first_hit(
             self.tables, hits.triangle, hits.u, hits.v, eye, np.float32(pixel), seeds.pixel, seeds.frame,
             settings.seed, settings.generator, s.shadow_o, s.shadow_d, s.index, s.light, s.gloss, s.bounce_o,
@@ -315,15 +335,21 @@ class Tracer:
         now: float = 0.0,
         previous: float = 0.0,
         cut: bool = False,
+        remember: str = "",
+        lamps: float = 1.0,
     ) -> FramePacket:
         """Frame ``index`` of the run at one path per pixel, ``size`` = (width, height).
 
         ``now``, ``previous``: times in seconds of this frame and the one before it. ``cut``: the frame does not
-        continue the one before it.
+        continue the one before it. ``remember``: one of :data:`raytrace.gradients.RULES`, for a frame with temporal
+        gradients, that depends on the frame before if that was traced just before it and remembered as well; "" for
+        one without. ``lamps``: share of their light that lamps give.
         """
         start = time.perf_counter()
-        self.set_time(now, previous)
+        self.set_time(now, previous, lamps)
         view, before = self._views(camera, previous_camera, size)
+        moment = Moment(index, now, size, (self.settings.seed, self.settings.generator))
+        reshading = self._reshading(moment, previous, view, camera, cut, remember) if remember else None
         count = size[0] * size[1]
         signals = np.empty((3 if self.variant.specular else 2, count, 4), np.float32)
         signals[..., 3] = 1.0
@@ -333,12 +359,39 @@ class Tracer:
             hits, directions = self._camera_hits(view, pixels, whole_rows=True)
             self._write_guides(view, before, pixels, hits, directions, outputs)
             seeds = Seeds(pixels.astype(np.uint32), np.full(len(pixels), index, np.uint32))
-            part = slice(int(pixels[0]), int(pixels[-1]) + 1)
+            first = int(pixels[0])
+            part = slice(first, int(pixels[-1]) + 1)
+            if reshading is not None:
+                reshading.replace(first, hits.triangle, hits.u, hits.v, seeds.pixel, seeds.frame)
             self.shade(hits, seeds, view.eye, *signals[:, part], pixel=view.pixel)
+            if reshading is not None:
+                reshading.note(first, hits.triangle, hits.u, hits.v, signals[0, part], signals[1, part])
 
-        embree = self.for_each_tile(tile, size)
+        embree = self.for_each_tile(tile, size, 4 if reshading is None else 4 * STRATUM)
         timings = {"trace": time.perf_counter() - start, "embree": embree}
-        return self._packet(index, now, size, signals, outputs, cut, camera, timings)
+        packet = self._packet(index, now, size, signals, outputs, cut, camera, previous_camera, timings)
+        if reshading is None:
+            return packet
+        self._memory.keep(moment, reshading.points)
+        return replace(packet, temporal_gradient=reshading.gradient)
+
+    def _reshading(
+        self, moment: Moment, previous: float, view: View, camera: Camera, cut: bool, rule: str
+    ) -> Reshading:
+        """What carries the points of the last frame into the frame of ``moment``."""
+        return Reshading(
+            self.scene.triangles,
+            self.scene.triangle_info,
+            None if cut else self._memory.recall(moment, previous),
+            moment.index,
+            moment.size,
+            view.eye,
+            view.matrix,
+            view.jitter,
+            camera.pixel_size(moment.size[1]),
+            self.settings.seed,
+            rule == "brightest",
+        )
 
     def reference(
         self,
@@ -360,9 +413,6 @@ class Tracer:
         count = size[0] * size[1]
         signals = 3 if self.variant.specular else 2
         sums = np.zeros((signals, count, 3))
-        normal = self.settings
-        seed = (normal.seed + REFERENCE_SEED) & 0xFFFFFFFF
-        self.settings = replace(normal, seed=seed, generator=HASH, regularize=False)
         done = [0]
 
         def tile(pixels: I32) -> None:
@@ -371,27 +421,44 @@ class Tracer:
             sample_of = np.empty((signals, len(pixels), 3), np.float32)
             seeds = Seeds(pixels.astype(np.uint32), np.empty(len(pixels), np.uint32))
             for sample in range(first_sample, first_sample + samples):
-                seeds.frame[:] = 0x80000000 + sample
+                seeds.frame[:] = FIRST_SAMPLE + sample
                 self.shade(hits, seeds, view.eye, *sample_of, pixel=view.pixel)
                 sums[:, part] += sample_of
             done[0] += len(pixels)
             if progress is not None:
                 progress(done[0] / count)
 
-        try:
+        with self._reference_numbers():
             self.for_each_tile(tile, size)
-        finally:
-            self.settings = normal
         return tuple((sums / samples).reshape(signals, size[1], size[0], 3))
 
-    def for_each_tile(self, work: Callable[[I32], None], size: tuple[int, int]) -> float:
+    def reference_frame(
+        self, sample: int, camera: Camera, size: tuple[int, int], now: float, lamps: float = 1.0
+    ) -> FramePacket:
+        """Sample ``sample`` of a reference, whose paths share no number with any frame's, as a frame of its own."""
+        with self._reference_numbers():
+            return self.frame(FIRST_SAMPLE + sample, camera, camera, size, now, now, lamps=lamps)
+
+    @contextmanager
+    def _reference_numbers(self) -> Iterator[None]:
+        """Meanwhile paths are drawn with uncycled hash numbers under a seed of their own, without regularisation."""
+        normal = self.settings
+        seed = (normal.seed + REFERENCE_SEED) & 0xFFFFFFFF
+        self.settings = replace(normal, seed=seed, generator=HASH, regularize=False)
+        try:
+            yield
+        finally:
+            self.settings = normal
+
+    def for_each_tile(self, work: Callable[[I32], None], size: tuple[int, int], rows: int = 4) -> float:
         """Run ``work`` on tiles of consecutive pixels; returns seconds inside Embree, averaged over the threads.
 
-        Tiles are whole rows, four or a multiple, so that packets of 4x4 pixels are the same for every tile size.
+        Tiles are whole rows, ``rows`` or a multiple, which is one of four, so that packets of 4x4 pixels are the same
+        for every tile size.
         """
         width, height = size
         count = width * height
-        step = width * 4 * max(1, self.settings.tile // (width * 4))
+        step = width * rows * max(1, self.settings.tile // (width * rows))
         tiles = [np.arange(i, min(i + step, count), dtype=np.int32) for i in range(0, count, step)]
 
         def timed(pixels: I32) -> float:
@@ -444,6 +511,7 @@ class Tracer:
         out: Outputs,
         cut: bool,
         camera: Camera,
+        previous_camera: Camera,
         timings: dict[str, float],
     ) -> FramePacket:
         width, height = size
@@ -463,5 +531,6 @@ class Tracer:
             basis=camera.axes(),
             jitter=camera.jitter,
             pixel_size=camera.pixel_size(height),
+            camera_step=camera.step_from(previous_camera),
             timings=timings,
         )

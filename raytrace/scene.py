@@ -23,6 +23,9 @@ F64 = NDArray[np.float64]
 F32 = NDArray[np.float32]
 I32 = NDArray[np.int32]
 
+Dimmer = Callable[[float], float]
+"""Share of its emission that a material gives, >= 0, as a function of time in seconds."""
+
 Motion = Callable[[float], F64]
 """Rigid object-to-world transform, (4, 4) float64 for column vectors, as a function of time in seconds."""
 
@@ -49,6 +52,7 @@ class Material:
     reflectance of what is diffuse, and that of a metal seen head-on.
     ``emission``: radiance of the front face (of both faces where ``double_sided``), W/(m² sr) in the scene's own scale,
     multiplied by ``emission_texture`` where there is one. Textures are indices into :attr:`Scene.textures`, -1 = none.
+    ``dimmer``: what of the emission there is at a time; None: always all of it.
 
     ``specular``: whether there is a specular lobe at all; without, ``metallic`` and ``roughness`` mean nothing.
     ``metallic``, ``roughness``: in [0, 1], multiplied by blue and green of the linear ``metallic_roughness_texture``;
@@ -65,6 +69,7 @@ class Material:
     emission: tuple[float, float, float] = (0.0, 0.0, 0.0)
     emission_texture: int = -1
     double_sided: bool = False
+    dimmer: Dimmer | None = None
     specular: bool = False
     metallic: float = 0.0
     roughness: float = 1.0
@@ -134,6 +139,11 @@ class Scene:
     def animated(self) -> bool:
         """Whether an object or a light moves."""
         return self.has_motion or any(light.motion is not None for light in self.lights)
+
+    @property
+    def dims(self) -> bool:
+        """Whether a lamp shines more or less in time."""
+        return any(material.dimmer is not None for material in self.materials)
 
     def standing(self) -> Scene:
         """The same without motion of objects and lights, as they are at time 0."""

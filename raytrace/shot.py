@@ -33,7 +33,10 @@ def jitter_of(index: int) -> tuple[float, float]:
 
 
 class Shot:
-    """``camera``: of a list of cameras the last stays. ``animate``: objects and lights move."""
+    """``camera``: of a list of cameras the last stays. ``animate``: objects and lights move.
+
+    ``remember``: as in :meth:`raytrace.integrator.Tracer.frame`; may be changed between frames.
+    """
 
     def __init__(
         self,
@@ -43,8 +46,10 @@ class Shot:
         camera: CameraPath = "still",
         animate: bool = False,
         jitter: bool = False,
+        remember: str = "",
     ) -> None:
         self.scene, self.tracer, self.size = scene, tracer, size
+        self.remember = remember
         self._camera, self._animate, self._jitter = camera, animate, jitter
 
     def time(self, index: int) -> float:
@@ -60,13 +65,23 @@ class Shot:
         return self.scene.camera_at(index / FPS, self._camera == "flight")
 
     def frame(self, index: int) -> FramePacket:
-        """Trace frame ``index``. Frame 0 continues nothing: nothing has moved since."""
+        """Trace frame ``index``. Frame 0 continues nothing: nothing has moved since.
+
+        Where points are remembered, a frame has gradients only if the one before it was traced just before.
+        """
         before = max(index - 1, 0)
         camera = self.camera(index)
         if self._jitter:
             camera = camera.with_jitter(jitter_of(index))
         return self.tracer.frame(
-            index, camera, self.camera(before), self.size, self.time(index), self.time(before), cut=index == 0
+            index,
+            camera,
+            self.camera(before),
+            self.size,
+            self.time(index),
+            self.time(before),
+            cut=index == 0,
+            remember=self.remember,
         )
 
     def reference(

@@ -13,6 +13,7 @@ from gl.profiler import Row
 from gl.resources import VALID
 from ui import theme, widgets
 from ui.keys import BINDINGS, Action
+from ui.live_error import MAP_TOP
 from ui.state import State
 from ui.status import Status
 from ui.switches import Switch, switches
@@ -30,6 +31,7 @@ def draw(state: State, status: Status) -> None:
         _methods(state)
         _switches(state, status)
         if status.result is not None:
+            _error(state, status)
             _history(status, status.result)
             _frame(status, status.result)
         _times(status)
@@ -134,7 +136,7 @@ def _times(status: Status) -> None:
     filtering = sum(row.milliseconds for row in status.passes)
     longest = max(status.trace_ms, filtering, 1e-6)
     with widgets.font_size(theme.SMALL):
-        _time(Branch("tracing", status.trace_ms), longest)
+        _time(Branch(status.work, status.trace_ms), longest)
         if status.passes:
             _time(Branch("filters", filtering, tuple(branches(status.passes))), longest, opened=2)
 
@@ -151,6 +153,26 @@ def _time(branch: Branch, longest: float, opened: int = 0) -> None:
         for part in branch.parts:
             _time(part, longest, opened - 1)
         imgui.tree_pop()
+
+
+def _error(state: State, status: Status) -> None:
+    """How far the picture is from a reference of the same view; or why there is none."""
+    widgets.heading("error")
+    with widgets.font_size(theme.SMALL):
+        found = status.errors_now
+        if found is None:
+            widgets.text("tracing a reference" if status.resting else "while nothing moves", theme.DIM)
+            widgets.tooltip("Once the camera rests and the animation is stopped (Space), a reference is traced.")
+            return
+        below = found.rmse < found.noise
+        rmse = f"< {found.noise:.4f}" if below else f"{found.rmse:.4f}"
+        widgets.text(f"RMSE {rmse}", theme.DIM if below else theme.TEXT)
+        widgets.tooltip("Of linear radiance without light sources, before anti-aliasing.")
+        imgui.same_line()
+        widgets.text(f"PSNR {found.psnr:.1f} dB  FLIP {found.flip:.4f}")
+        widgets.text(f"reference: {found.samples:,} paths, its own RMSE {found.noise:.4f}", theme.DIM)
+        if state.error_map:
+            widgets.text(f"map: FLIP from 0, black, to {MAP_TOP:g} and more", theme.DIM)
 
 
 def _history(status: Status, result: Result) -> None:

@@ -30,12 +30,14 @@ class Action(Enum):
     VIEW = auto()
     """Look at another texture of the graph [+1 or -1: the next or the one before]."""
     FLIP = auto()
-    """Show or hide something that is no parameter of the picture [a switch of :class:`ui.state.State`]."""
+    """Show or hide, or switch, something that is no parameter of the picture [a switch of :class:`ui.state.State`]."""
     RESOLUTION = auto()
     """Render at the next size of the ladder [+1 or -1]."""
     PATH = auto()
     """Note the camera of every frame from now on, or stop and write what was noted."""
     SCREENSHOT = auto()
+    RECORD = auto()
+    """Record the frames shown, or stop recording."""
     BACK = auto()
     """Let go of the mouse or, if it is free, close the window."""
     FLY = auto()
@@ -63,6 +65,7 @@ BINDINGS: Final = (
     Binding("0", Action.SHOW, "off: one path per pixel as it is", "none"),
     Binding("1", Action.SHOW, "SVGF, spatiotemporal variance-guided filtering", "svgf"),
     Binding("2", Action.SHOW, "BMFR, blockwise multi-order feature regression", "bmfr"),
+    Binding("3", Action.SHOW, "A-SVGF, adaptive SVGF: forgets light that has changed", "asvgf"),
     Binding("TAB", Action.PREVIOUS, "back to the method shown before, and forth again"),
     Binding("P", Action.NEXT, "next preset of the method's parameters", "preset"),
     Binding("F1", Action.NEXT, "accumulation over time on or off", "temporal"),
@@ -80,6 +83,7 @@ BINDINGS: Final = (
     Binding("DOWN", Action.COUNT, "half a stop darker", "display.exposure -0.5"),
     Binding("L", Action.NEXT, "exposure by itself (light meter) on or off", "display.auto_exposure"),
     Binding("SPACE", Action.ANIMATE, "moving objects and lamps stop or go on"),
+    Binding("O", Action.FLIP, "lamps off or on", "lamps"),
     Binding("PERIOD", Action.STEP, "one step of the animation, then stop"),
     Binding("N", Action.NEXT_SCENE, "next of the scenes that come with the program"),
     Binding("R", Action.RESET_CAMERA, "camera back to where it began"),
@@ -91,10 +95,12 @@ BINDINGS: Final = (
     Binding(
         "I", Action.FLIP, "numbers of the pixel under the mouse: channels, history, why it was rejected", "inspect"
     ),
+    Binding("M", Action.FLIP, "error map against a reference that is traced while nothing moves", "error_map"),
     Binding("EQUAL", Action.RESOLUTION, "render more pixels", "+1"),
     Binding("MINUS", Action.RESOLUTION, "render fewer pixels", "-1"),
     Binding("G", Action.FLIP, "show or hide the panel with numbers and sliders", "hud"),
     Binding("K", Action.FLIP, "show or hide this list of keys", "help"),
+    Binding("F11", Action.RECORD, "record the frames to a folder recording_NNN; once more: stop"),
     Binding("F12", Action.SCREENSHOT, "save the picture as shot_NNN.png"),
     Binding("ESCAPE", Action.BACK, "let go of the mouse; otherwise quit"),
     Binding("W", Action.FLY, "fly forward", "forward"),

@@ -20,12 +20,14 @@ Deviations from the paper:
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 from config import Bmfr
 from gl.graph import ComputePass, FragmentPass, Graph, In, Out, Prev, Tex, Uniform
+from gl.passes.asvgf import LAMBDA
+from gl.passes.fast_history import FastHistory
 from gl.passes.temporal import Guides
-from raytrace.frame import Basis, Vector
+from raytrace.frame import Basis, CameraStep, Vector
 
 REPROJECTION = "xy: position in the last frame, texel units; z: mask of the 2x2 valid taps; w: history length N, frames"
 SAMPLES = "rgb: accumulated irradiance, finite; a: frames in it, 0 where there is none"
@@ -55,7 +57,7 @@ class View:
     """What a frame's camera and its renderer tell the filter besides textures.
 
     ``basis``, ``jitter``, ``pixel_size``, ``index``: as in the :class:`FramePacket`. ``threads``: invocations that work
-    on a block.
+    on a block. ``step``: how the camera has moved, where histories are to be looked for as if nothing else had.
     """
 
     basis: Basis
@@ -63,6 +65,7 @@ class View:
     pixel_size: float
     index: int
     threads: int
+    step: CameraStep | None = None
 
     @property
     def rows(self) -> tuple[Vector, ...]:
@@ -98,6 +101,23 @@ class Accumulate(FragmentPass):
     u_normal_tolerance = Uniform("float", "[0;4] squared distance of the normals")
 
 
+class AccumulateAdaptive(Accumulate):
+    """The same, but where light has changed the history follows it and counts for less (Schied et al. 2018)."""
+
+    in_lambda = In(LAMBDA)
+
+
+class AccumulateInPlace(Accumulate):
+    """The same, but points are looked for where they are now, as the authors do: what moves finds another or none."""
+
+    u_turn = Uniform("mat3", "from this frame's camera space to the last frame's")
+    u_step = Uniform("vec3", "the same, added after that, scene units")
+
+
+class AccumulateInPlaceAdaptive(AccumulateInPlace, AccumulateAdaptive):
+    """Both."""
+
+
 class Samples(FragmentPass):
     """This frame's samples alone, in the form in which :class:`Accumulate` hands them on."""
 
@@ -126,6 +146,7 @@ class Fit(ComputePass):
     u_noise = Uniform("float", "[0;1] largest noise added to a feature")
     u_rank_tolerance = Uniform("float", "> 0, what of a feature is neglected, root of the mean square over the block")
     u_caution = Uniform("float", ">= 0, variances that noise is expected to explain in a feature of a part")
+    u_fresh_caution = Uniform("float", ">= 0, the same where the samples are means of few frames")
 
     def __init__(self, p: Bmfr, view: View) -> None:
         shift = OFFSETS[view.index % len(OFFSETS)]
@@ -137,6 +158,7 @@ class Fit(ComputePass):
                 "NOISE": int(p.regularization != "rank"),
                 "UNIT": int(p.unit_scale),
                 **({"PARTS": part_count(p), "PART": p.part_side} if p.part_side else {}),
+                **({"FRESH": p.short_history} if p.part_side and p.short_history else {}),
             },
             u_view=view.rows,
             u_jitter=view.jitter,
@@ -145,6 +167,7 @@ class Fit(ComputePass):
             u_noise=p.noise,
             u_rank_tolerance=1e-7 if p.regularization == "noise" else p.rank_tolerance,
             u_caution=p.caution,
+            u_fresh_caution=p.fresh_caution,
         )
 
     def work_groups(self, size: tuple[int, int]) -> tuple[int, int]:
@@ -168,6 +191,12 @@ class AccumulateFit(FragmentPass):
     prev_color = Prev("rgb: what this pass wrote in the last frame")
     out_color = Out("rgba16f", "rgb: accumulated fitted irradiance")
     u_alpha = Uniform("float", "[0;1] smallest weight of the new fit")
+
+
+class AccumulateFitAdaptive(AccumulateFit):
+    """The same, but where light has changed the history follows it and counts for less (Schied et al. 2018)."""
+
+    in_lambda = In(LAMBDA)
 
 
 def layout(features: str) -> dict[str, int]:
@@ -201,55 +230,88 @@ def thread_count(features: str, software: bool, parts: int = 0) -> int:
 def shared_bytes(features: int, threads: int, parts: int = 0) -> int:
     """Shared memory of ``bmfr/fit.comp``: half of the triangles and all of the parts', bounds of position, weights."""
     slots = max(threads // 2, 1) + parts
-    triangle = features * (features + 7) // 2 + (1 if parts else 0)
+    triangle = features * (features + 7) // 2 + (2 if parts else 0)
     return 4 * triangle * slots + 2 * 16 * threads + 16 * features * (1 + parts)
 
 
 def bmfr(
-    g: Graph, signals: dict[str, Tex], features: dict[str, Tex], guides: Guides, p: Bmfr, view: View, name: str = "bmfr"
+    g: Graph,
+    signals: dict[str, Tex],
+    features: dict[str, Tex],
+    guides: Guides,
+    p: Bmfr,
+    view: View,
+    name: str = "bmfr",
+    change: Tex | None = None,
 ) -> Tex:
     """Filter the sum of ``signals`` (noisy irradiance by name: "direct" and, if it is apart, "indirect"); returns the
     clean one. Histories are named by ``name`` and by whether the signals hold the albedo.
 
-    ``features``: textures of features that are no guides, "albedo" and where there is one "roughness".
+    ``features``: textures of features that are no guides, "albedo" and where there is one "roughness". ``change``: what
+    :func:`gl.passes.asvgf.change_of` knows of the light, both signals being one.
     """
     inputs = {f"in_{name}": noisy for name, noisy in signals.items()}
     names = name if p.demodulate else f"{name}.radiance"
+    extra = {} if change is None else {"in_lambda": change}
+    work = _ACCUMULATIONS[view.step is not None, change is not None]
+    moved: dict[str, Any] = {} if view.step is None else {"u_turn": view.step[0], "u_step": view.step[1]}
+    before = guides.optional if view.step is None else {}
+    adaptive = {} if change is None else {"ADAPTIVE": 1}
     with g.scope(name):
         if not p.temporal:
             samples = g.add(Samples(), in_surface=guides.surface, **inputs).out_color
             return _fit(g, samples, features, guides, p, view) if p.fit else samples
         noisy, guide = g.history(f"{names}.noisy", "rgba16f"), g.history(f"{names}.guide", "rg32f")
-        accumulated = g.add(
-            Accumulate(
+        found = g.add(
+            work(
                 u_view=view.rows,
                 u_pixel_size=view.pixel_size,
                 u_alpha=p.alpha,
                 u_max_history=float(p.max_history),
                 u_position_tolerance=p.position_tolerance,
                 u_normal_tolerance=p.normal_tolerance,
-                defines={"ROUND_HISTORY": int(p.round_history)},
+                defines={"ROUND_HISTORY": int(p.round_history), **adaptive, **({"IN_PLACE": 1} if moved else {})},
+                **moved,
             ),
+            "accumulate",
             in_motion=guides.motion,
             in_surface=guides.surface,
             prev_color=noisy,
             prev_guide=guide,
             **inputs,
-            **guides.optional,
+            **before,
+            **extra,
         )
-        g.feed(noisy, accumulated.out_color)
-        g.feed(guide, accumulated.out_guide)
+        accumulated, fast = found.out_color, None
+        if p.fast_clamp:
+            fast = FastHistory(g, names, signals["direct"], signals.get("indirect"), found.out_reprojection, p)
+            accumulated = fast.bound(accumulated)
+        g.feed(noisy, accumulated)
+        g.feed(guide, found.out_guide)
         if not p.fit:
-            return accumulated.out_color
+            return accumulated
         fitted = g.history(f"{names}.fitted", "rgba16f")
         clean = g.add(
-            AccumulateFit(u_alpha=p.alpha_fit),
-            in_color=_fit(g, accumulated.out_color, features, guides, p, view),
-            in_reprojection=accumulated.out_reprojection,
+            (AccumulateFit if change is None else AccumulateFitAdaptive)(u_alpha=p.alpha_fit, defines=adaptive),
+            "accumulate_fit",
+            in_color=_fit(g, accumulated, features, guides, p, view),
+            in_reprojection=found.out_reprojection,
             prev_color=fitted,
+            **extra,
         ).out_color
+        if fast is not None:
+            clean = fast.bound(clean)
         g.feed(fitted, clean)
         return clean
+
+
+_ACCUMULATIONS: Final[dict[tuple[bool, bool], type[Accumulate]]] = {
+    (False, False): Accumulate,
+    (False, True): AccumulateAdaptive,
+    (True, False): AccumulateInPlace,
+    (True, True): AccumulateInPlaceAdaptive,
+}
+"""By whether what moves is looked for where it is now, and whether light is known to have changed."""
 
 
 def _fit(g: Graph, samples: Tex, features: dict[str, Tex], guides: Guides, p: Bmfr, view: View) -> Tex:

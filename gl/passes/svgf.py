@@ -33,28 +33,15 @@ and 1 % more in the Cornell box, where hardly anything is disoccluded. The other
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any
 
 from config import Svgf
 from gl.graph import FragmentPass, Graph, In, Out, Tex, Uniform
 from gl.passes.display import GLOSSY
-from gl.passes.temporal import REPROJECTION, Guides, accumulate, reproject
-
-GLOSS = "of specular light: rgb: its albedo, 0: there is none; a: roughness"
-
-
-class Variance(FragmentPass):
-    """Replace the temporal variance by a spatial estimate where the history is shorter than four frames (sec. 4.2)."""
-
-    shader = "svgf/variance.frag"
-    in_color = In("rgb: irradiance; a: standard deviation over time")
-    in_moments = In("first and second moment of luminance", optional=True)
-    in_surface = In("xyz: shading normal, world; w: depth, scene units")
-    in_gradient = In("depth change per pixel, scene units")
-    in_reprojection = In(REPROJECTION, optional=True)
-    out_color = Out("rgba16f", "rgb: irradiance, unchanged unless PREFILTER; a: standard deviation")
-    u_sigma_z = Uniform("float", "> 0, depth edge-stopping")
-    u_pixel_size = Uniform("float", "> 0, scene units a pixel is wide at depth 1")
+from gl.passes.temporal import REPROJECTION, Change, Guides, reproject
+from gl.passes.variance import GLOSS, estimate
 
 
 class Atrous(FragmentPass):
@@ -93,13 +80,6 @@ class Atrous(FragmentPass):
         )
 
 
-class GlossyVariance(Variance):
-    """The same for specular light, in which only surfaces of the same roughness have a part."""
-
-    in_specular_albedo = In(GLOSS)
-    u_sigma_r = Uniform("float", "> 0, roughness edge-stopping")
-
-
 class GlossyAtrous(Atrous):
     """The same for specular light, in which only surfaces of the same roughness have a part.
 
@@ -121,22 +101,28 @@ def svgf(
     guides: Guides,
     p: Svgf,
     pixel_size: float,
+    method: str = "svgf",
+    changes: Mapping[str, Change] = MappingProxyType({}),
     specular_albedo: Tex | None = None,
 ) -> dict[str, Tex]:
     """Filter each of ``signals`` (noisy irradiance by name, "direct", "indirect", "specular", or "both" for all as
     one); returns the clean ones. ``specular_albedo`` (:data:`GLOSS`) steers the filter of specular light.
 
+    ``method``: whose passes and histories these are. ``changes``: what is known of each signal's change of light.
+
     All of them share one reprojection. Histories are named by the set of signals, so that filtering them together
     after filtering them apart begins with a new history, as it must; and by whether the signals hold the albedo.
     """
-    names = "svgf." + "+".join(signals) + ("" if p.demodulate else ".radiance")
-    with g.scope("svgf"):
+    names = f"{method}." + "+".join(signals) + ("" if p.demodulate else ".radiance")
+    with g.scope(method):
         found = reproject(g, guides, names, p, pixel_size) if p.temporal else None
         clean: dict[str, Tex] = {}
         for signal, noisy in signals.items():
             with g.scope(signal):
+                change = changes.get(signal)
                 gloss = specular_albedo if signal == "specular" else None
-                clean[signal] = _filter_signal(g, f"{names}.{signal}", noisy, found, guides, p, pixel_size, gloss)
+                name = f"{names}.{signal}"
+                clean[signal] = _filter_signal(g, name, noisy, found, guides, p, pixel_size, change, gloss)
         return clean
 
 
@@ -148,38 +134,23 @@ def _filter_signal(
     guides: Guides,
     p: Svgf,
     pixel_size: float,
+    change: Change | None,
     gloss: Tex | None,
 ) -> Tex:
-    x = noisy
-    estimate: dict[str, Tex] = {}
-    history = None
-    if reprojection is not None:
-        history = g.history(name, "rgba16f")
-        x, moments = accumulate(g, x, reprojection, history, p, clamp=p.clamp)
-        estimate = {"in_moments": moments, "in_reprojection": reprojection}
-    # Without time there is no other variance than the one in space; without guidance by variance there is none at all.
-    shape = {"in_surface": guides.surface, "in_gradient": guides.gradient}
-    atrous = Atrous if gloss is None else GlossyAtrous
-    if gloss is not None:
-        shape["in_specular_albedo"] = gloss
-    if p.variance_guided:
-        prefilter = {"PREFILTER": 1} if p.prefilter else {}
-        stage = Variance(u_sigma_z=p.sigma_z, u_pixel_size=pixel_size, defines=prefilter)
-        if gloss is not None:
-            stage = GlossyVariance(
-                u_sigma_z=p.sigma_z, u_sigma_r=p.sigma_r, u_pixel_size=pixel_size, defines=prefilter | GLOSSY
-            )
-        unfiltered, x = x, g.add(stage, "variance", in_color=x, **shape, **estimate).out_color
-    else:
-        unfiltered = x
+    history = g.history(name, "rgba16f") if reprojection is not None else None
+    unfiltered, x, length = estimate(g, noisy, reprojection, history, guides, p, pixel_size, change, gloss)
     if history is not None and p.feedback < 0:
         g.feed(history, unfiltered)
-    length: dict[str, Tex] = {}
-    if reprojection is not None and p.variance_guided and p.accumulated_variance:
-        length = {"in_reprojection": reprojection}
+    atrous = Atrous if gloss is None else GlossyAtrous
+    shape = {"in_surface": guides.surface, "in_gradient": guides.gradient}
+    if gloss is not None:
+        shape["in_specular_albedo"] = gloss
+    mean: dict[str, Tex] = {}
+    if length is not None and p.variance_guided and p.accumulated_variance:
+        mean = {"in_reprojection": length}
     for i in range(p.iterations):
         iteration = atrous(p, 1 << i, pixel_size, raw=x is noisy)
-        x = g.add(iteration, f"atrous{i}", in_color=x, **shape, **(length if i == 0 else {})).out_color
+        x = g.add(iteration, f"atrous{i}", in_color=x, **shape, **(mean if i == 0 else {})).out_color
         if history is not None and i == p.feedback:
             g.feed(history, x)  # no copy: x is written into the history's other half
     return x

@@ -38,7 +38,7 @@ SCENES = {
         DARK, lights=(PunctualLight("spot", "spot"),), environment=Environment("grey", np.ones((4, 8, 3), np.float32))
     ),
 }
-ALL_IMAGES = images_of(Variant(*(True for _ in Variant._fields)), positions=True)
+ALL_IMAGES = images_of(Variant(*(True for _ in Variant._fields)), positions=True, gradients=True)
 GLOSS = {"specular", "specular_albedo"}
 any_scene = pytest.mark.parametrize("what", SCENES.values(), ids=SCENES.keys())
 
@@ -59,7 +59,7 @@ def test_frames_have_the_images_that_are_told(what: str, positions: bool, missin
         packet = tracer.frame(0, scene.camera, scene.camera, SIZE)
         present = {f.name for f in fields(FramePacket) if isinstance(getattr(packet, f.name), np.ndarray)}
         assert set(tracer.images) == set(images_of(tracer.variant, positions)) == present
-        assert set(ALL_IMAGES) - present == missing
+        assert set(ALL_IMAGES) - present == missing | {"temporal_gradient"}, "nobody asked for gradients"
 
 
 def test_images_of_a_frame_are_all_told() -> None:
@@ -124,6 +124,16 @@ def test_everything_is_counted() -> None:
     assert (content.punctual, content.environment_size) == ({"spot": 1}, (8, 4))
     assert content.environment_bytes == 4 * (6 * 9 * 4 + 6 + 5 * 9)
     assert 0.0 < content.sky_share <= 0.5
+
+
+def test_a_feature_that_is_compiled_in_for_nothing_changes_no_bit() -> None:
+    scene = compile_scene(cornell())
+    with Tracer(scene) as plain, Tracer(scene, Settings(also=("sky",))) as more:
+        assert (plain.variant.sky, more.variant.sky) == (False, True)
+        camera = scene.scene.camera
+        one, other = (tracer.frame(3, camera, camera, SIZE) for tracer in (plain, more))
+    for name in plain.images:
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
 
 
 def test_files_of_one_name_are_two_scenes(tmp_path: Path) -> None:

@@ -216,3 +216,15 @@ def test_a_camera_path_that_is_no_json_or_no_file_is_refused(tmp_path: Path) -> 
     ):
         with pytest.raises(UserError, match=words):
             read_frames(tmp_path / name)
+
+
+def test_a_step_leads_from_one_camera_s_space_to_the_other_s() -> None:
+    before = Camera.look_at((1e5, 2.0, 3.0), (1e5 + 1.0, 2.5, -4.0))
+    now = Camera.look_at((1e5 + 0.3, 2.2, 2.5), (1e5 + 2.0, 2.0, -4.0))
+    point = np.array([1e5 + 1.5, 3.0, -7.0])
+    spaces = [np.array(camera.basis()) @ (point - np.array(camera.position)) for camera in (now, before)]
+    turn, shift = now.step_from(before)
+    np.testing.assert_allclose(np.array(turn) @ spaces[0] + shift, spaces[1], atol=1e-9)
+    turn, shift = now.step_from(now)
+    np.testing.assert_allclose(turn, np.eye(3), atol=1e-15)
+    assert shift == (0.0, 0.0, 0.0)

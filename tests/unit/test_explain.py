@@ -73,7 +73,7 @@ def test_every_scene_and_denoiser_is_explained(subject: Subjects, scene: Scene, 
 def test_the_tracer_does_what_the_scene_needs(subject: Subjects) -> None:
     lines = tracer_section(subject(everything()))
     assert lines[0] == f"tracer: up to 4 rays per path, {4 * PIXELS:,} per frame of 64x36"
-    assert "with a sky, moving objects, textures; without an environment" in " ".join(" ".join(lines).split())
+    assert "guides with a sky, moving objects, textures; without" in " ".join(" ".join(lines).split())
     assert "two scenes" in row(lines, "Embree")
 
     lines = tracer_section(subject(DARK))

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from config import Config, Display, Firefly, Svgf, Taa, load
+from config import Asvgf, Config, Display, Firefly, Svgf, Taa, load
 from gl.pipelines import DENOISERS, FrameTraits, build
 from gl.plan import Plan, check_no_feedback
 
@@ -19,6 +19,10 @@ PLANS = Path(__file__).parent.parent / "plans"
 
 def svgf(**changes: object) -> Config:
     return Config(svgf=replace(Svgf(), **changes))  # type: ignore[arg-type]
+
+
+def asvgf(**changes: object) -> Config:
+    return Config(asvgf=replace(Asvgf(), **changes))  # type: ignore[arg-type]
 
 
 GLOSSY = FrameTraits(specular=True)
@@ -43,15 +47,25 @@ CASES: dict[str, tuple[Config, str, FrameTraits]] = {
     "svgf_unfiltered_feedback": (svgf(feedback_level=-1), "svgf", FrameTraits()),
     "svgf_late_feedback": (svgf(feedback_level=2), "svgf", FrameTraits()),
     "svgf_without_taa": (replace(Config(), taa=Taa(enabled=False)), "svgf", FrameTraits()),
+    "asvgf": (Config(), "asvgf", FrameTraits()),
+    "asvgf_paper": (load(None, ("asvgf.preset=paper",)), "asvgf", FrameTraits()),
+    "asvgf_reference": (load(None, ("asvgf.preset=reference",)), "asvgf", FrameTraits()),
+    "asvgf_moving": (Config(), "asvgf", FrameTraits(moving=True)),
+    "asvgf_unguided": (asvgf(gradient_guided=False, cut="power", color_clamp=True), "asvgf", FrameTraits()),
+    "asvgf_without_temporal": (asvgf(temporal=False), "asvgf", FrameTraits()),
     "bmfr": (Config(), "bmfr", FrameTraits()),
     "bmfr_paper": (load(None, ("bmfr.preset=paper",)), "bmfr", FrameTraits()),
     "bmfr_reference": (load(None, ("bmfr.preset=reference",)), "bmfr", FrameTraits()),
     "bmfr_albedo": (load(None, ('bmfr.features="1,albedo,w"',)), "bmfr", FrameTraits()),
+    "bmfr_adaptive": (load(None, ("bmfr.adaptive=true",)), "bmfr", FrameTraits()),
+    "bmfr_fast_clamp": (load(None, ("bmfr.fast_clamp=true",)), "bmfr", FrameTraits()),
+    "svgf_fast_clamp": (svgf(fast_clamp=True), "svgf", FrameTraits()),
     "bmfr_without_temporal": (load(None, ("bmfr.temporal=false",)), "bmfr", FrameTraits()),
     "bmfr_without_fit": (load(None, ("bmfr.fit=false",)), "bmfr", FrameTraits()),
     "bmfr_without_either": (load(None, ("bmfr.temporal=false", "bmfr.fit=false")), "bmfr", FrameTraits()),
     "bmfr_without_demodulation": (load(None, ("bmfr.demodulate=false",)), "bmfr", FrameTraits()),
     "bmfr_moving": (Config(), "bmfr", FrameTraits(moving=True)),
+    "bmfr_paper_moving": (load(None, ("bmfr.preset=paper",)), "bmfr", FrameTraits(moving=True)),
     "bmfr_on_hardware": (Config(), "bmfr", FrameTraits(software=False)),
     "none_glossy": (Config(), "none", GLOSSY),
     "accumulate_glossy": (Config(), "accumulate", GLOSSY),
@@ -59,10 +73,29 @@ CASES: dict[str, tuple[Config, str, FrameTraits]] = {
     "svgf_glossy_joint": (svgf(separate=False), "svgf", GLOSSY),
     "svgf_glossy_without_demodulation": (svgf(demodulate=False), "svgf", GLOSSY),
     "svgf_glossy_joint_without_demodulation": (svgf(demodulate=False, separate=False), "svgf", GLOSSY),
+    "asvgf_glossy": (Config(), "asvgf", GLOSSY),
+    "joint_glossy": (Config(), "joint", GLOSSY),
     "bmfr_glossy": (load(None, ('bmfr.features="1,n,w,roughness"',)), "bmfr", GLOSSY),
     "bmfr_glossy_joint": (load(None, ("bmfr.separate=false",)), "bmfr", GLOSSY),
     "bmfr_glossy_without_demodulation": (load(None, ("bmfr.demodulate=false",)), "bmfr", GLOSSY),
     "svgf_moving": (Config(), "svgf", FrameTraits(moving=True)),
+    "svgf_welford": (svgf(variance="welford"), "svgf", FrameTraits()),
+    "svgf_welford_mean": (svgf(variance="welford-mean"), "svgf", FrameTraits()),
+    "svgf_variance_in_space": (svgf(variance="spatial", separate=False), "svgf", FrameTraits()),
+    "svgf_variance_in_space_clamped": (svgf(variance="spatial", color_clamp=True), "svgf", FrameTraits()),
+    "svgf_variance_in_both": (svgf(variance="spatial-temporal", separate=False), "svgf", FrameTraits()),
+    "svgf_exaggerated": (svgf(variance="exaggerated", separate=False), "svgf", FrameTraits()),
+    "gaussian": (Config(), "gaussian", FrameTraits()),
+    "gaussian_whole": (load(None, ("gaussian.separable=false",)), "gaussian", FrameTraits()),
+    "bilateral": (Config(), "bilateral", FrameTraits()),
+    "joint": (Config(), "joint", FrameTraits()),
+    "joint_blend_first": (load(None, ("spatial.order=blend-first",)), "joint", FrameTraits()),
+    "joint_separable": (Config(), "joint-separable", FrameTraits()),
+    "joint_without_temporal": (load(None, ("spatial.temporal=false",)), "joint", FrameTraits()),
+    "joint_without_demodulation": (load(None, ("spatial.demodulate=false",)), "joint", FrameTraits()),
+    "atrous": (Config(), "atrous", FrameTraits()),
+    "atrous_jitter": (Config(), "atrous-jitter", FrameTraits()),
+    "guided": (Config(), "guided", FrameTraits()),
     "accumulate_auto_exposure": (Config(display=Display(auto_exposure=True)), "accumulate", FrameTraits()),
     "accumulate_mark_bad": (Config(display=Display(mark_bad="on")), "accumulate", FrameTraits()),
     "accumulate_split": (Config(), "accumulate", FrameTraits()),

@@ -25,11 +25,16 @@ class Notes:
     def __init__(self) -> None:
         self.frames: list[SimpleNamespace] = []
         self.closed = False
+        self.positions = False
+
+    def carry_positions(self, wanted: bool) -> None:
+        self.positions = wanted
 
     def frame(
-        self, index: int, camera: Camera, previous: Camera, size: Any, now: float, before: float, cut: bool
+        self, index: int, camera: Camera, previous: Camera, size: Any, now: float, before: float, cut: bool, **how: Any
     ) -> Any:
-        self.frames.append(SimpleNamespace(index=index, camera=camera, size=size, step=round(now * FPS), cut=cut))
+        noted = {"index": index, "camera": camera, "size": size, "step": round(now * FPS), "cut": cut, **how}
+        self.frames.append(SimpleNamespace(**noted))
         return self.frames[-1]
 
     def close(self) -> None:
@@ -41,7 +46,7 @@ def stage() -> Iterator[Stage]:
     def camera(frame: int) -> Camera:
         return Camera((float(frame), 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0), 1.0)
 
-    scene = SimpleNamespace(scene=SimpleNamespace(name="room"), extent=8.0)
+    scene = SimpleNamespace(scene=SimpleNamespace(name="room", dims=False), extent=8.0, moves=True)
     shot: Any = SimpleNamespace(scene=scene, camera=camera, tracer=Notes())
     made = Stage(shot, True, lambda: None)
     yield made
@@ -115,3 +120,17 @@ def test_the_mouse_turns_the_camera_once(stage):
     assert turned.camera.forward[0] > 0.2
     (still,) = frames(stage, state, 1)
     assert still.camera.forward == turned.camera.forward
+
+
+def test_gradients_are_traced_for_the_method_that_reads_them_and_lamps_follow_their_key(stage):
+    state = state_of()
+    state.perform(keys.BY_KEY["O"])
+    assert state.news == "lamps off"
+    assert [(p.remember, p.lamps) for p in frames(stage, state, 1)] == [("", 0.0)]
+    state.perform(keys.BY_KEY["3"])
+    state.perform(keys.BY_KEY["O"])
+    assert [(p.remember, p.lamps) for p in frames(stage, state, 1)] == [("random", 1.0)]
+    state.set("asvgf.remember", "brightest")
+    assert frames(stage, state, 1)[0].remember == "brightest"
+    state.perform(keys.BY_KEY["F1"])
+    assert frames(stage, state, 1)[0].remember == "", "without a history there is nothing to cut"

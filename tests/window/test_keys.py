@@ -4,6 +4,7 @@ screen, or in the passes that the frame runs through.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 
 import assets
+from bench.recording.sequence import open_sequence
 from raytrace.camera_path import read_keyframes
 from raytrace.shot import FPS
 from tests.window.desktop import F32, START_SECONDS, STILL, App, application, difference, plan, roughness, wait_for
@@ -150,6 +152,20 @@ def animation(app: App) -> None:
     app.ask("space", "animation stopped")
     stopped = app.settled()
     assert difference(stopped, app.settled()) < STILL
+
+
+def lamps(app: App) -> None:
+    """A-SVGF shows the dark at once, SVGF fades: three pictures after the key tell them apart."""
+    shares = {}
+    for key, denoiser in (("1", "svgf"), ("3", "asvgf")):
+        app.press(key)
+        app.await_passes(plan(denoiser))
+        before = app.settled().mean()
+        app.ask("o", "lamps off")
+        shares[denoiser] = [app.picture().mean() / before for _ in range(3)]
+        app.ask("o", "lamps on")
+        assert abs(app.settled().mean() / before - 1.0) < 0.05
+    assert shares["asvgf"][-1] < 0.05 < shares["svgf"][-1] < 0.95, shares
 
 
 def single_step(app: App) -> None:
@@ -308,10 +324,39 @@ def fast(app: App) -> None:
     assert start - place(app.settled())[0] > 1.5 * slow > 0.0
 
 
+def recording(app: App) -> None:
+    """The frames shown, in their size and in order, from the key to the key."""
+    folder = Path(app.ask("F11", r"recording to (\S+)$")[1])
+    wait_for(lambda: (folder / "world_position3.exr").exists(), "four recorded frames")
+    told = app.ask("F11", r"recorded (\d+) frames to (\S+)$")
+    app.hear(rf"^{re.escape(str(folder))}$")
+    sequence = open_sequence(folder)
+    assert (sequence.frames, str(folder)) == (int(told[1]), told[2])
+    assert sequence.size == (160, 90)
+    assert sequence.notes["about"]["scene"] == "cornell"
+    first, last = sequence.packet(0), sequence.packet(sequence.frames - 1)
+    assert not np.array_equal(first.direct, last.direct)
+    assert (last.motion[..., :2] == 0.0).all()  # the camera is at rest
+    assert first.jitter != last.jitter  # but for what the anti-aliasing wants
+    since = len(app.stdout())
+    app.press("0")
+    app.hear("noisy frame", since)
+    assert not (folder / f"color{sequence.frames}.exr").exists()
+
+
+def error_map(app: App) -> None:
+    before = app.settled()
+    app.ask("m", "error map on$")
+    wait_for(lambda: difference(before, app.picture()) > 0.05, "the map of the errors instead of the picture")
+    app.ask("m", "error map off$")
+    wait_for(lambda: difference(before, app.picture()) < 2 * STILL, "the picture again")
+
+
 CHECKS: dict[str, Callable[[App], None]] = {
     "0": method("0", "none"),
     "1": method("1", "svgf"),
     "2": method("2", "bmfr"),
+    "3": method("3", "asvgf"),
     "TAB": previous,
     "P": stage("p", "svgf.preset=paper", "svgf.preset=reference", "svgf.preset=best"),
     "F1": stage("F1", "svgf.temporal=false", "svgf.temporal=true"),
@@ -329,6 +374,7 @@ CHECKS: dict[str, Callable[[App], None]] = {
     "DOWN": exposure("Down", "Up", -1),
     "L": stage("l", "display.auto_exposure=true", "display.auto_exposure=false"),
     "SPACE": animation,
+    "O": lamps,
     "PERIOD": single_step,
     "N": next_scene,
     "R": camera_home,
@@ -338,10 +384,12 @@ CHECKS: dict[str, Callable[[App], None]] = {
     "V": texture_before,
     "X": split,
     "I": overlay("i", "inspect"),
+    "M": error_map,
     "EQUAL": resolution("equal", "minus", (213, 120)),
     "MINUS": resolution("minus", "equal", (120, 68)),
     "G": overlay("g", "hud"),
     "K": overlay("k", "help"),
+    "F11": recording,
     "F12": screenshot,
     "ESCAPE": let_go,
     "W": flight("w", moved=2, sign=1),

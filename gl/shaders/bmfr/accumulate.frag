@@ -1,6 +1,8 @@
 // Blend this frame's sample with the history of the same surface. Koskela et al. 2019, preprocessing.
 //
 // Reprojection and blending in one: both read the same texels. bmfr/accumulate_fit.frag blends by the same decisions.
+// ADAPTIVE: where light has changed, the history follows it and counts for less (Schied et al. 2018). IN_PLACE: the point is
+// looked for where it is now, as if only the camera had moved.
 
 #include "common/finite.glsl"
 #include "common/octahedral.glsl"
@@ -14,6 +16,9 @@ uniform sampler2D in_surface; // normal, depth
 #if HAS_IN_PREV_NORMAL
 uniform sampler2D in_prev_normal;
 #endif
+#ifdef ADAPTIVE
+uniform sampler2D in_lambda; // x: how much of the history is void; z: factor by which the light has changed
+#endif
 uniform sampler2D prev_color; // as out_color
 uniform sampler2D prev_guide; // as out_guide
 uniform bool u_history_valid;
@@ -23,6 +28,10 @@ uniform float u_alpha;
 uniform float u_max_history;
 uniform float u_position_tolerance;
 uniform float u_normal_tolerance;
+#ifdef IN_PLACE
+uniform mat3 u_turn;
+uniform vec3 u_step;
+#endif
 
 layout(location = 0) out vec4 out_color;        // rgb, samples in it
 layout(location = 1) out vec4 out_reprojection; // place in the last frame, mask of valid taps, history length
@@ -56,6 +65,11 @@ void main() {
     bool hit = motion.w >= 0.0;
 
     vec2 lattice = vec2(p) + motion.xy * vec2(size);
+#ifdef IN_PLACE
+    vec3 now = u_turn * view_position(vec2(p), surface.w) + u_step;
+    motion.z = now.z;
+    lattice = now.xy / (u_pixel_size * now.z) + 0.5 * vec2(size) - 0.5;
+#endif
     bool seen = u_history_valid && hit && is_finite(motion) && is_finite(surface) && is_finite(normal) &&
                 motion.z > 0.0 && all(greaterThan(lattice, vec2(-1.0))) && all(lessThan(lattice, vec2(size)));
     vec3 color = vec3(0.0);
@@ -93,7 +107,15 @@ void main() {
         history = floor(history + 0.5);
 #endif
         float share = max(1.0 / (history + 1.0), u_alpha);
-        c = mix(color / total, c, usable ? share : 0.0);
+        color /= total;
+#ifdef ADAPTIVE
+        vec4 change = texelFetch(in_lambda, p, 0);
+        float void_share = clamp(change.x, 0.0, 1.0);
+        color *= change.z;
+        share = mix(share, 1.0, void_share);
+        history = max((history + 1.0) / (1.0 + void_share * history) - 1.0, 0.0);
+#endif
+        c = mix(color, c, usable ? share : 0.0);
     }
     float count = hit ? history + (usable ? 1.0 : 0.0) : 0.0;
     out_color = round_to_half(vec4(c, floor(count + 0.5)));

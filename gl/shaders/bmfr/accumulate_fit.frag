@@ -1,11 +1,14 @@
 // Blend the fitted picture with those of the frames before. Koskela et al. 2019, postprocessing.
 //
-// The texels to blend with are those that bmfr/accumulate.frag has accepted.
+// The texels to blend with are those that bmfr/accumulate.frag has accepted. ADAPTIVE: as there.
 
 #include "common/finite.glsl"
 
 uniform sampler2D in_color;        // the fit
 uniform sampler2D in_reprojection; // place in the last frame, mask of valid taps, history length
+#ifdef ADAPTIVE
+uniform sampler2D in_lambda; // z: factor by which the light has changed
+#endif
 uniform sampler2D prev_color;      // as out_color
 uniform bool u_history_valid;
 uniform float u_alpha;
@@ -37,6 +40,12 @@ void main() {
         if ((mask & 8) != 0) gather(corner + ivec2(1, 1), f.x * f.y);
     }
     // The plain mean at first: an exponential one would let the first fits, the worst, outweigh the next twenty.
-    if (total > 0.0) c = mix(color / total, c, max(1.0 / (found.w + 1.0), u_alpha));
+    if (total > 0.0) {
+        color /= total;
+#ifdef ADAPTIVE
+        color *= texelFetch(in_lambda, p, 0).z; // the history's length has been cut already
+#endif
+        c = mix(color, c, max(1.0 / (found.w + 1.0), u_alpha));
+    }
     out_color = round_to_half(vec4(c, 1.0));
 }

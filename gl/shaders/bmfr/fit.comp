@@ -2,11 +2,13 @@
 //
 // One work group per block of GROUP_X x GROUP_Y pixels. X_AT: place of feature X's first component in a row; what is not
 // in the list of features is neither computed nor read. NOISE: stochastic regularisation. UNIT: scale to [0, 1]. PARTS: of
-// the block, PART pixels wide, that are fitted again; not defined if there are none.
+// the block, PART pixels wide, that are fitted again; not defined if there are none. FRESH: of fewer frames a part is judged
+// by another caution; not defined if of none.
 
 layout(local_size_x = THREADS) in;
 
 #include "common/finite.glsl"
+#include "common/hash.glsl"
 #include "bmfr/solver.glsl"
 #include "bmfr/parts.glsl"
 
@@ -25,6 +27,7 @@ uniform uint u_seed;
 uniform float u_noise;
 uniform float u_rank_tolerance;
 uniform float u_caution;
+uniform float u_fresh_caution;
 
 layout(rgba16f, binding = 0) writeonly uniform image2D out_color;
 
@@ -139,13 +142,6 @@ void write_features(ivec2 p, vec4 surface, vec4 place) {
 #endif
 }
 
-// Finalizer of Wellons, "lowbias32".
-uint hash(uint x) {
-    x = (x ^ (x >> 16)) * 0x7feb352du;
-    x = (x ^ (x >> 15)) * 0x846ca68bu;
-    return x ^ (x >> 16);
-}
-
 uint state; // of the noise
 
 // Uniform noise in [-u_noise, u_noise) for every feature but the constant.
@@ -172,6 +168,9 @@ void fold_pixel(int element, uint seed) {
     bool counts = is_surface(surface, place) && color.a > 0.0;
     EACH(SELECT)
     for (int k = FEATURES; k < COLUMNS; ++k) row[k] = counts ? row[k] : 0.0;
+#ifdef FRESH
+    age += counts ? color.a : 0.0;
+#endif
     fold_row();
 }
 
@@ -240,7 +239,7 @@ void main() {
     if (thread == 0) solve(u_rank_tolerance);
     barrier();
 #if PARTS
-    for (int part = thread; part < PARTS; part += THREADS) solve_part(part, u_rank_tolerance, u_caution);
+    for (int part = thread; part < PARTS; part += THREADS) solve_part(part, u_rank_tolerance, u_caution, u_fresh_caution);
     barrier();
 #endif
     for (int piece = thread % PIECES; piece < PIECES; piece += THREADS) write_piece(piece, thread / PIECES);

@@ -42,7 +42,8 @@ float roughness, inverse_r, inverse_reach;
 vec4 color_at(ivec2 q) {
     vec4 c = texelFetch(in_color, q, 0);
 #if RAW
-    c = is_finite(c.rgb) ? vec4(clamp_radiance(c.rgb), 0.0) : vec4(0.0);
+    // Below 0: there is no sample.
+    c = is_finite(c.rgb) ? vec4(clamp_radiance(c.rgb), 0.0) : vec4(vec3(0.0), -1.0);
 #endif
     return c;
 }
@@ -76,6 +77,9 @@ void tap(ivec2 offset, float kernel, float inverse_z) {
     w = gloss.r + gloss.g + gloss.b > 0.0 ? w : 0.0; // where nothing shines there is no light to tell of
 #endif
     w = inside ? sane_weight(w) : 0.0;
+#if RAW
+    w = c.a < 0.0 ? 0.0 : w;
+#endif
     color += w * c.rgb;
     variance += (w * c.a) * (w * c.a);
     weight += w;
@@ -121,6 +125,10 @@ void main() {
     color = centre.rgb;
     variance = centre.a * centre.a;
     weight = 1.0;
+#if RAW
+    // What is around a missing sample decides, if there is anything.
+    if (centre.a < 0.0) weight = 1e-20, variance = 0.0;
+#endif
     pair(1, 0, A);      pair(0, 1, A);
     pair(1, 1, A * A);  pair(1, -1, A * A);
     pair(2, 0, B);      pair(0, 2, B);
