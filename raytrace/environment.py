@@ -51,9 +51,8 @@ class EnvironmentTables:
 
 
 def no_environment() -> EnvironmentTables:
-    """Tables that nothing reads."""
-    one = np.zeros((1, 2), np.float32)
-    return EnvironmentTables(np.zeros((1, 1, 4), np.float32), one[0], one, 0.0, 0.0)
+    """Tables of the smallest picture, black."""
+    return build_environment(Environment("none", np.zeros((1, 1, 3), np.float32)))
 
 
 def build_environment(environment: Environment) -> EnvironmentTables:

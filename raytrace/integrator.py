@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from raytrace import kernels, kernels_glossy
 from raytrace.camera import Camera
-from raytrace.compiled import OBJECT, CompiledScene
+from raytrace.compiled import CompiledScene
 from raytrace.cutouts import CutoutCaster, cutouts_of
 from raytrace.embree import open_caster
 from raytrace.features import ILLUMINATION, images_of
@@ -148,19 +148,20 @@ class Settings:
 class Tracer:
     """Traces one compiled scene. ``with Tracer(...)`` or :meth:`close` ends its threads.
 
-    ``images``: names of those its frames have. ``scene_id``: their number, which no other tracer of this process gives.
+    ``variant``: what is compiled in, if that is to be more than the scene needs. ``images``: names of those its frames
+    have. ``scene_id``: their number, which no other tracer of this process gives.
     """
 
-    def __init__(self, scene: CompiledScene, settings: Settings | None = None) -> None:
+    def __init__(self, scene: CompiledScene, settings: Settings | None = None, variant: Variant | None = None) -> None:
         self.scene = scene
         self.settings = settings or Settings()
-        self.variant: Variant = variant_of(scene)
+        self.variant: Variant = variant or variant_of(scene)
         self.images = images_of(self.variant, self.settings.positions)
         self.scene_id = next(_identities)
         self.rays = open_caster(scene.triangles, scene.static_count, self.settings.backend)
-        if (holes := cutouts_of(scene)) is not None:
-            self.rays = CutoutCaster(self.rays, holes)
-        self.tables = tables_of(scene)
+        if self.variant.cutout:
+            self.rays = CutoutCaster(self.rays, cutouts_of(scene))
+        self.tables = tables_of(scene, self.variant)
         self._guides = guide_kernel(self.variant, self.settings.positions)
         self._detailed = self.variant.specular or self.variant.bumps
         if self._detailed:
@@ -237,8 +238,8 @@ class Tracer:
             triangle, u, v = self.rays.intersect_rows(origins, directions, view.size[0])
         else:
             triangle, u, v = self.rays.intersect(origins, directions)
-        # Index -1 of a miss picks some object; it is overwritten where that matters.
-        objects = np.where(triangle >= 0, self.scene.triangle_info[triangle, OBJECT], np.int32(-1))
+        objects = np.empty(count, np.int32)
+        kernels.objects_of(triangle, self.scene.triangle_info, objects)
         return Hits(triangle, u, v, objects), directions
 
     def shade(
@@ -268,8 +269,8 @@ class Tracer:
         s = self._scratch
         s.reserve(count)
         settings = self.settings
-        direct[:, :3] = 0.0
-        indirect[:, :3] = 0.0
+        kernels.clear(direct)
+        kernels.clear(indirect)
         shadows, bounces = self._first_hit(
             self.tables, hits.triangle, hits.u, hits.v, eye, seeds.pixel, seeds.frame, settings.seed,
             settings.generator, s.shadow_o, s.shadow_d, s.index, s.light, s.bounce_o, s.bounce_d, s.bounce_index,
@@ -296,7 +297,7 @@ class Tracer:
         s.reserve_glossy(count)
         gloss = _NO_GLOSS if specular is None else specular
         for image in (direct, indirect, gloss):
-            image[:, :3] = 0.0
+            kernels.clear(image)
         shadows, bounces = self._first_hit(
             self.tables, hits.triangle, hits.u, hits.v, eye, np.float32(pixel), seeds.pixel, seeds.frame,
             settings.seed, settings.generator, s.shadow_o, s.shadow_d, s.index, s.light, s.gloss, s.bounce_o,

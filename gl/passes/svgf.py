@@ -62,16 +62,16 @@ class Atrous(FragmentPass):
     u_pixel_size = Uniform("float", "> 0, scene units a pixel is wide at depth 1")
 
     def __init__(self, p: Svgf, step: int, pixel_size: float, raw: bool = False) -> None:
-        # A power of two is squared into place: pow() costs more than seven products.
-        squarings = p.sigma_n.bit_length() - 1
         declared = self.ports.uniforms
-        extra: dict[str, Any] = {"u_sigma_r": p.sigma_r} if "u_sigma_r" in declared else {}
+        extra: dict[str, Any] = {}
+        if "u_sigma_r" in declared:
+            extra |= {"u_sigma_r": p.sigma_r, "u_reach": p.reach}
         if "u_normal_history" in declared:
             extra["u_normal_history"] = float(p.normal_history)
         super().__init__(
             defines={
                 "STEP": step,
-                "SIGMA_N_SQUARINGS": squarings if p.sigma_n == 1 << squarings else -1,
+                "SIGMA_N_SQUARINGS": squarings(p.sigma_n),
                 "LUMINANCE_STOP": int(p.variance_guided),
                 "RAW": int(raw),
                 **(GLOSSY if "u_sigma_r" in extra else {}),
@@ -87,10 +87,15 @@ class Atrous(FragmentPass):
 
 
 class GlossyAtrous(Atrous):
-    """The same for specular light, in which only surfaces of the same roughness have a part."""
+    """The same for specular light, in which only surfaces of the same roughness have a part.
+
+    What a narrow lobe reflects has edges that no guide shows, and less noise than a wide one: the distance over which
+    it is averaged grows with the lobe's width, as in NVIDIA's NRD.
+    """
 
     in_specular_albedo = In(GLOSS)
     u_sigma_r = Uniform("float", "> 0, roughness edge-stopping")
+    u_reach = Uniform("float", "> 0, pixels per squared roughness")
 
 
 class AtrousGrowing(Atrous):
@@ -102,6 +107,12 @@ class AtrousGrowing(Atrous):
 
 class GlossyAtrousGrowing(AtrousGrowing, GlossyAtrous):
     """Both."""
+
+
+def squarings(exponent: int) -> int:
+    """log2 of a power of two, -1 of any other number: squaring that often costs less than pow()."""
+    count = exponent.bit_length() - 1
+    return count if exponent == 1 << count else -1
 
 
 def svgf(

@@ -19,7 +19,7 @@ from raytrace.load import load_scene
 from raytrace.punctual import PunctualLight
 from raytrace.scene import Scene
 from raytrace.shot import Shot
-from raytrace.tables import Variant
+from raytrace.tables import Variant, variant_of
 from tests.tracer.conftest import OpenTracer
 from tests.tracer.scenes import cornell, everything, glossy, rigid
 
@@ -124,6 +124,16 @@ def test_everything_is_counted() -> None:
     assert (content.punctual, content.environment_size) == ({"spot": 1}, (8, 4))
     assert content.environment_bytes == 4 * (6 * 9 * 4 + 6 + 5 * 9)
     assert 0.0 < content.sky_share <= 0.5
+
+
+def test_a_feature_that_is_compiled_in_for_nothing_changes_no_bit() -> None:
+    scene = compile_scene(cornell())
+    with Tracer(scene) as plain, Tracer(scene, variant=variant_of(scene)._replace(sky=True)) as more:
+        assert (plain.variant.sky, more.variant.sky) == (False, True)
+        camera = scene.scene.camera
+        one, other = (tracer.frame(3, camera, camera, SIZE) for tracer in (plain, more))
+    for name in plain.images:
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
 
 
 def test_files_of_one_name_are_two_scenes(tmp_path: Path) -> None:

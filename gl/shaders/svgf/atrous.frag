@@ -17,6 +17,7 @@ uniform sampler2D in_reprojection; // w: history length before this frame
 #ifdef GLOSSY
 uniform sampler2D in_specular_albedo; // a: roughness
 uniform float u_sigma_r;
+uniform float u_reach;
 #endif
 #ifdef GROWING
 uniform sampler2D in_length; // w: history length before this frame
@@ -40,7 +41,7 @@ float l, inverse_l, floor_z;
 vec3 color;
 float weight, variance;
 #ifdef GLOSSY
-float roughness, inverse_r;
+float roughness, inverse_r, inverse_reach;
 #endif
 
 vec4 color_at(ivec2 q) {
@@ -76,7 +77,7 @@ void tap(ivec2 offset, float kernel, float inverse_z) {
 #endif
 #ifdef GLOSSY
     vec4 gloss = texelFetch(in_specular_albedo, q, 0);
-    e += abs(roughness - gloss.a) * inverse_r;
+    e += abs(roughness - gloss.a) * inverse_r + length(vec2(offset)) * inverse_reach;
 #endif
     float w = kernel * normal_weight(s.xyz) * exp2(-e);
 #ifdef GLOSSY
@@ -116,6 +117,7 @@ void main() {
 #ifdef GLOSSY
     roughness = texelFetch(in_specular_albedo, p, 0).a;
     inverse_r = LOG2_E / u_sigma_r;
+    inverse_reach = LOG2_E / (u_reach * roughness * roughness + 0.1);
 #endif
 
 #if LUMINANCE_STOP

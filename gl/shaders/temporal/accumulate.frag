@@ -1,10 +1,11 @@
 // Blend this frame's sample with the history found by temporal/reproject.frag, and the luminance moments with it.
 //
 // Schied et al. 2017, sec. 4.1 and 4.2: C' = a·C + (1 - a)·C'_prev, moments likewise. HALF: the colour's precision.
-// CLAMPED: the history's colour is first brought within the bounds of temporal/neighbourhood.frag. ADAPTIVE: where light
-// has changed, the history counts for less (Schied et al. 2018, sec. 4.4); SIGNAL: which channel of λ tells it; POWER: its
-// length becomes N (1 - λ)^u_power, otherwise that of a mean in which the new sample has the weight it gets. CENTRED: the
-// second moment is that about the mean (Welford 1962). UNBIASED: h / (h - 1) of it is the variance, Bessel's correction.
+// CLAMPED: the history's colour is first brought within the bounds of temporal/neighbourhood.frag. ADAPTIVE: where
+// light has changed, the history follows it and counts for less (Schied et al. 2018, sec. 4.4); SIGNAL: which channel
+// of λ tells it; POWER: its length becomes N (1 - λ)^u_power, otherwise that of a mean in which the new sample has the
+// weight it gets. CENTRED: the second moment is that about the mean (Welford 1962). UNBIASED: h / (h - 1) of it is the
+// variance, Bessel's correction.
 
 #include "common/color.glsl"
 #include "common/finite.glsl"
@@ -12,13 +13,13 @@
 uniform sampler2D in_color;
 uniform sampler2D in_reprojection;
 uniform sampler2D prev_color;   // rgb, standard deviation
-uniform sampler2D prev_moments; // first and second luminance moment; ADAPTIVE: z: part of the history's length that was left
+uniform sampler2D prev_moments; // first and second luminance moment; z: what was left of the length, if ADAPTIVE
 #ifdef CLAMPED
 uniform sampler2D in_low;
 uniform sampler2D in_high;
 #endif
 #ifdef ADAPTIVE
-uniform sampler2D in_lambda;
+uniform sampler2D in_lambda; // xy: λ of direct and indirect light; zw: factors by which they have changed
 uniform float u_power;
 #endif
 uniform bool u_history_valid;
@@ -97,7 +98,8 @@ void main() {
     for (int i = 0; i <= last; ++i)
         if ((mask & (16 << i)) != 0) gather(centre + ivec2(i % 3 - 1, i / 3 - 1), 1.0);
 
-    float n = 0.0, void_share = 0.0; // frames behind the history, and what of it the change of light takes away
+    // Frames behind the history, what of it the change of light takes away, and what of this frame's sample is news.
+    float n = 0.0, void_share = 0.0, news = 1.0;
     if (total > 0.0) {
         color /= total;
         moments /= total;
@@ -115,15 +117,17 @@ void main() {
         void_share = clamp(change[SIGNAL], 0.0, 1.0);
         // What was seen in other light, as it would be in this one.
         float factor = change[2 + SIGNAL];
-        color *= factor;
+        color = clamp_radiance(color * factor);
         moments *= vec2(factor, factor * factor);
+        // A sample that was carried over from the last frame is in the history already, unless its light has changed.
+        if (texelFetch(in_color, p, 0).a == 0.0) news = void_share;
 #if POWER
         n *= pow(max(1.0 - void_share, 1e-9), u_power); // pow(0, 0) is undefined
 #endif
 #endif
         float share = 1.0 / (n + 1.0);
-        c = usable ? mix(color, c, mix(max(share, u_alpha), 1.0, void_share)) : color;
-        m = usable ? blend_moments(moments, l, mix(max(share, u_alpha_moments), 1.0, void_share)) : moments;
+        c = usable ? mix(color, c, news * mix(max(share, u_alpha), 1.0, void_share)) : color;
+        m = usable ? blend_moments(moments, l, news * mix(max(share, u_alpha_moments), 1.0, void_share)) : moments;
     }
 #ifdef CENTRED
     float variance = m.y;
@@ -141,7 +145,7 @@ void main() {
 #if !POWER
     n = max((n + 1.0) / (1.0 + void_share * n) - 1.0, 0.0);
 #endif
-    out_moments = vec4(m, (n + 1.0) / (found.w + 1.0), n);
+    out_moments = vec4(m, (n + news) / (found.w + 1.0), max(n - (1.0 - news), 0.0));
 #else
     out_moments = m;
 #endif
