@@ -72,6 +72,11 @@ class LiveError:
         return self._verdict
 
     @property
+    def trouble(self) -> str:
+        """Why there are no numbers and will be none, "" for nothing."""
+        return f"the error of the picture: {self._judge.trouble}" if self._judge.trouble else ""
+
+    @property
     def map(self) -> moderngl.Texture | None:
         """The error map, sRGB; None while there is none."""
         return self._texture if self._verdict is not None else None

@@ -334,7 +334,7 @@ class Viewer:
         status.resting = self.stage.resting
         status.errors_now = self._live.update(now, self._result, self.stage.snapshot, self.state.error_map)
         self._log.error(status.errors_now)
-        status.errors = [*self._filters.errors, *filter(None, [self._refused])]
+        status.errors = [*self._filters.errors, *filter(None, [self._refused, self._live.trouble])]
         self._log.frame(packet.index, packet.size, self._result.plan, status.errors)
         return True
 

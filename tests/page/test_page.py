@@ -14,7 +14,7 @@ import pytest
 from bench import page
 from bench.page.gather import content
 from tests.page.browser import Browser, browser, middle, require_browser
-from tests.page.sample import report
+from tests.page.sample import STAGE, report
 
 SCENES = ("cornell", "a </script> scene")
 
@@ -134,6 +134,14 @@ def test_number_keys_flip_without_moving_the_view(shown):
     assert view(shown)["a"] == "noisy"
 
 
+def test_pictures_of_variants_are_nearly_without_loss(shown):
+    box(shown, "#canvas-a")
+    shown.run("viewer.show(arguments[0])", STAGE.name)
+    assert shown.run("return document.getElementById('pick-a').value") == STAGE.name
+    corner = "document.getElementById('canvas-a').getContext('2d').getImageData(20, 20, 1, 1).data[0]"
+    shown.wait(f"Math.abs({corner} - 160) < 3", "its picture")
+
+
 def test_the_wheel_zooms_about_the_mouse_and_dragging_pans_both(shown):
     shown.press("c")
     x, y, width, height = box(shown, "#canvas-a")
@@ -202,4 +210,4 @@ def test_nothing_sticks_out_on_a_phone(shown):
     wide = """return [...document.querySelectorAll("main section > *, header > *, nav")].filter(
         e => e.getBoundingClientRect().right > document.documentElement.clientWidth + 1)"""
     shown.wait(f"(() => {{ {wide} }})().length === 0", "a page that fits")
-    assert shown.run("return document.documentElement.scrollWidth <= window.innerWidth")
+    shown.wait("document.documentElement.scrollWidth <= window.innerWidth", "a page that need not be scrolled sideways")

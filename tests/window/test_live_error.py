@@ -106,6 +106,16 @@ def test_the_map_is_a_picture_of_the_errors(live, ctx):
     shown.outputs["radiance"].release()
 
 
+def test_a_judge_in_trouble_is_told_and_not_asked_again(live, ctx):
+    shown = Shown(ctx)
+    assert live.trouble == ""
+    live._judge.trouble = "the other process has ended"
+    live.update(0.0, shown, snapshot(), True)
+    assert live._judge.asked == 0
+    assert live.trouble == "the error of the picture: the other process has ended"
+    shown.outputs["radiance"].release()
+
+
 def test_a_picture_of_another_size_waits(live, ctx):
     shown = Shown(ctx, (12, 8))
     live.update(0.0, shown, snapshot(), True)
