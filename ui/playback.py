@@ -8,6 +8,7 @@ from typing import Final, Protocol
 
 import numpy as np
 
+from gl.pipelines import remembered
 from raytrace.camera import Camera
 from raytrace.frame import FramePacket
 from raytrace.shot import FPS
@@ -162,7 +163,15 @@ class Playback:
         elif not settled or state.reset or state.screenshot or wanted != self._settled:
             self._again = True
         if settled:
+            self._tell_of_gradients(state)
             self._settled = wanted
+
+    def _tell_of_gradients(self, state: State) -> None:
+        """Say so where a method that wants to know where light changes is shown on frames that do not tell."""
+        new = not self._settled or self._settled[0] != state.denoiser
+        packet = self._packet
+        if new and packet and packet.temporal_gradient is None and remembered(state.config, state.denoiser):
+            state.tell("no gradients were recorded: light counts as unchanged")
 
     def take(self) -> FramePacket | None:
         if self._again:
