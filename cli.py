@@ -398,6 +398,11 @@ def record_parser() -> Parser:
         "--jitter", action="store_true", help="shift the camera within the pixel from frame to frame (default: not)"
     )
     parser.add_argument(
+        "--gradients",
+        action="store_true",
+        help="with temporal gradients, for replay --denoiser asvgf; a ninth of the samples then repeat earlier paths",
+    )
+    parser.add_argument(
         "--reference-spp",
         type=whole("--reference-spp", 1, 10_000_000),
         default=0,

@@ -111,7 +111,7 @@ class Svgf(Section):
     first_sigma_l: float = param(4.0, 0.1, 1000, "[0.1;1000] sigma_l of the first iteration, in sigma_l of the others")
     sigma_r: float = param(0.1, 0.001, 100, "[0.001;100] tolerance for roughness, of specular light only")
     reach: float = param(
-        100.0, 1, 1e6, "[1;1000000] distance over which specular light is averaged, pixels per squared roughness"
+        30.0, 1, 1e6, "[1;1000000] distance over which specular light is averaged, pixels per squared roughness"
     )
 
     @property

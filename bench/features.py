@@ -8,18 +8,15 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from statistics import median
 from time import perf_counter
 from typing import Final
 
-import numpy as np
-
 import assets
 from console import table
-from raytrace.compiled import CompiledScene, compile_scene
-from raytrace.cutouts import CutoutCaster, Cutouts
-from raytrace.integrator import Settings, Tracer
+from raytrace.compiled import compile_scene
+from raytrace.integrator import Tracer
 from raytrace.shot import Shot
 
 SIZE: Final = (640, 360)
@@ -58,7 +55,8 @@ def measure(scene: str, size: tuple[int, int] = SIZE, rounds: int = ROUNDS) -> l
     with ExitStack() as stack:
         tracers = {"": Tracer(compiled)}
         lacking = [name for name in FEATURES if not getattr(tracers[""].variant, name)]
-        tracers |= {name: _with(compiled, name) for name in lacking}
+        needed = tracers[""].variant
+        tracers |= {name: Tracer(compiled, variant=needed._replace(**{name: True})) for name in lacking}
         shots = {}
         for name, tracer in tracers.items():
             stack.callback(tracer.close)
@@ -71,34 +69,6 @@ def measure(scene: str, size: tuple[int, int] = SIZE, rounds: int = ROUNDS) -> l
                 shot.frame(index)
                 times[name].append(1e3 * (perf_counter() - start))
     return [Cost(name, median(times[""]), median(times[name])) for name in lacking]
-
-
-def _with(compiled: CompiledScene, feature: str) -> Tracer:
-    """A tracer of the same scene with the code of ``feature``, for which nothing in it asks."""
-    if feature == "colored":
-        compiled = replace(compiled, colors=np.ones((len(compiled.triangles), 9), np.float32))
-    plain = Tracer(compiled, Settings(threads=1))
-    variant = plain.variant._replace(**{feature: True})
-    plain.close()
-    tracer = Tracer(compiled, variant=variant)
-    if feature == "cutout":
-        tracer.rays = CutoutCaster(tracer.rays, _no_holes(compiled))
-    return tracer
-
-
-def _no_holes(compiled: CompiledScene) -> Cutouts:
-    count = len(compiled.scene.materials)
-    return Cutouts(
-        triangles=compiled.triangles,
-        info=compiled.triangle_info,
-        uvs=compiled.triangle_uvs,
-        alphas=np.ones((1, 3), np.float32),
-        factor=np.ones(count, np.float32),
-        cutoff=np.zeros(count, np.float32),
-        texture=np.full(count, -1, np.int32),
-        texels=np.zeros(1, np.uint8),
-        sizes=np.array([(0, 1, 1)], np.int64),
-    )
 
 
 def main(scenes: Sequence[str]) -> None:

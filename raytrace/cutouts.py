@@ -46,13 +46,11 @@ class Cutouts(NamedTuple):
     sizes: Any
 
 
-def cutouts_of(compiled: CompiledScene) -> Cutouts | None:
-    """What the rays of a scene must know of its holes, None where it has none."""
+def cutouts_of(compiled: CompiledScene) -> Cutouts:
+    """What the rays of a scene must know of its holes."""
     scene = compiled.scene
     used = set(np.unique(compiled.triangle_info[:, MATERIAL]).tolist())
     masked = [m.alpha_cutoff is not None and k in used for k, m in enumerate(scene.materials)]
-    if not any(masked):
-        return None
     numbers: dict[int, int] = {}
     texels: list[NDArray[np.uint8]] = []
     sizes: list[tuple[int, int, int]] = []

@@ -39,8 +39,8 @@ class FramePacket:
     With noise:
 
     ``direct``, ``indirect`` (H, W, 4): rgb = illumination divided by the albedo ("demodulated"), linear; a unused (1),
-    except in ``direct`` of a frame with temporal gradients: 0 where the sample was carried over from the last frame, 2
-    where it may be carried into the next one.
+    except in a frame with temporal gradients: 0 where the sample was carried over from the last frame, 2 where it may
+    be carried into the next one.
     Direct holds the light sample of the first hit and light sources hit by the bounce ray, combined by multiple
     importance sampling; indirect is what arrives over one bounce. 0 where the camera ray misses. Both are what the
     diffuse part of the surface reflects.

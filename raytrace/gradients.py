@@ -42,8 +42,8 @@ RULES: Final = ("random", "brightest")
 place of another one, it also makes the picture brighter (docs/asvgf.md)."""
 
 ORDINARY, CARRIED, REMEMBERED = np.float32(1.0), np.float32(0.0), np.float32(2.0)
-"""What ``a`` of the image ``direct`` tells of a sample: it is of this frame alone, it was carried over from the last
-one, it was chosen to be carried into the next."""
+"""What ``a`` of ``direct`` and ``indirect`` tells of a sample: it is of this frame alone, it was carried over from the
+last one, it was chosen to be carried into the next."""
 
 _ZERO, _HALF = np.float32(0.0), np.float32(0.5)
 _PLANE_TOLERANCE = np.float32(0.5)  # widths of a pixel
@@ -163,7 +163,7 @@ class Reshading:
             )  # fmt: skip
 
     def note(self, first: int, triangle: I32, u: F32, v: F32, direct: F32, indirect: F32) -> None:
-        """Take the gradients from a tile's shaded samples, choose what to remember, and mark both in ``direct``."""
+        """Take the gradients from a tile's shaded samples, choose what to remember, and mark both."""
         before = self._before if self._before is not None else self.points
         _note(
             self._triangles, before, self._landings, self._eye, self._size[0], first, self._seed, uint32(self._index),
@@ -316,7 +316,7 @@ def _note(  # type: ignore[no-untyped-def]
             carried = -1
             if chosen[k] >= 0:
                 carried = landings.pixel[chosen[k]] - first
-                direct[carried, 3] = CARRIED
+                direct[carried, 3] = indirect[carried, 3] = CARRIED
                 _spread(carried, k, chosen[k], before, direct, indirect, gradient)
             corner = row * STRATUM * width + column * STRATUM
             columns = min(STRATUM, width - column * STRATUM)
@@ -327,7 +327,7 @@ def _note(  # type: ignore[no-untyped-def]
                 best = _random(corner, columns, lines, width, carried, triangle, bits)
             points.triangle[k] = -1
             if best >= 0:
-                direct[best, 3] = REMEMBERED
+                direct[best, 3] = indirect[best, 3] = REMEMBERED
                 points.triangle[k], points.u[k], points.v[k] = triangle[best], u[best], v[best]
                 x, y, z = interpolate(triangles[triangle[best]], 0, u[best], v[best])
                 points.front[k] = _sees_front(triangles[triangle[best]], x, y, z, eye)

@@ -159,9 +159,9 @@ class Tracer:
         self.images = images_of(self.variant, self.settings.positions)
         self.scene_id = next(_identities)
         self.rays = open_caster(scene.triangles, scene.static_count, self.settings.backend)
-        if (holes := cutouts_of(scene)) is not None:
-            self.rays = CutoutCaster(self.rays, holes)
-        self.tables = tables_of(scene)
+        if self.variant.cutout:
+            self.rays = CutoutCaster(self.rays, cutouts_of(scene))
+        self.tables = tables_of(scene, self.variant)
         self._guides = guide_kernel(self.variant, self.settings.positions)
         self._detailed = self.variant.specular or self.variant.bumps
         if self._detailed:

@@ -77,7 +77,12 @@ class Variant(NamedTuple):
     """Surfaces with holes."""
 
 
-def tables_of(scene: CompiledScene) -> Tables:
+def _white(scene: CompiledScene) -> Any:
+    """Colours of vertices for kernels that ask for them although the scene has none."""
+    return np.ones((len(scene.triangles), 9), np.float32)
+
+
+def tables_of(scene: CompiledScene, variant: Variant) -> Tables:
     lights = scene.lights
     return Tables(
         scene.triangles,
@@ -88,7 +93,7 @@ def tables_of(scene: CompiledScene) -> Tables:
         scene.emission,
         scene.material_info,
         scene.gloss,
-        scene.colors,
+        scene.colors if len(scene.colors) == len(scene.triangles) or not variant.colored else _white(scene),
         table() if scene.has_specular else np.zeros((1, 1, 2), np.float32),
         scene.textures.texels,
         scene.textures.levels,

@@ -9,7 +9,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.metrics import Mask, pooled
+from bench.metrics import Mask, display_mse, pooled, psnr, relmse
+from bench.metrics_visual import flip, ssim
 from bench.recording import exr
 from bench.recording.layout import IMAGES
 from bench.recording.sequence import REFERENCE, Sequence, open_sequence
@@ -97,7 +98,7 @@ def _refined(
                 advance(before + share * part)
 
             means = shot.tracer.reference(camera, shot.size, part, time, reference.samples, told)
-            reference = reference.plus(means[0] + means[1], part)
+            reference = reference.plus(np.concatenate([means[0] + means[1], *means[2:]], axis=2), part)
             done += part
     return reference
 
@@ -107,7 +108,7 @@ def sums_path(folder: Path, index: int) -> Path:
 
 
 def _load(sequence: Sequence, index: int) -> Reference:
-    return load(sums_path(sequence.folder, index), sequence.size)
+    return load(sums_path(sequence.folder, index), sequence.size, "specular" in sequence.images)
 
 
 def _publish(sequence: Sequence, index: int, reference: Reference, notes: dict[str, Any]) -> None:
@@ -124,7 +125,11 @@ def _publish(sequence: Sequence, index: int, reference: Reference, notes: dict[s
 
 
 def _finish(recording: Recording, sequence: Sequence, notes: dict[str, Any]) -> None:
-    """Note the flicker that the references have by their own noise, and print how noisy they are."""
+    """Note what errors the references have by their own noise, and print how noisy they are."""
+    for index in range(sequence.frames):
+        note = notes.get(str(index), {})
+        if note.get("noise") is not None and "floors" not in note:
+            note["floors"] = floors(_load(sequence, index), sequence.packet(index, cut=True))
     last: tuple[int, Reference, FramePacket] | None = None
     for index in range(1, sequence.frames):
         note = notes.get(str(index))
@@ -140,6 +145,19 @@ def _finish(recording: Recording, sequence: Sequence, notes: dict[str, Any]) -> 
     if noise:
         least = min(note["samples"] for note in notes.values())
         print(f"references: {least} paths per pixel or more, RMSE of their own noise {pooled(noise):.3g} (linear)")
+
+
+def floors(reference: Reference, packet: FramePacket) -> dict[str, float]:
+    """What the reference's own noise makes of every error of a picture, as in :meth:`bench.scores.Truth.floors`."""
+    first, second = reference.halves(packet)
+    mask, share = surfaces(packet), reference.share
+    return {
+        "rmse": reference.noise(packet, mask),
+        "relmse": relmse(first, second, mask) * share**2,
+        "psnr": psnr(display_mse(first, second) * share**2),
+        "ssim": 1.0 - (1.0 - ssim(first, second)) * share**2,
+        "flip": flip(first, second) * share,
+    }
 
 
 def _with_packet(

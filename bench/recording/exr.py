@@ -114,7 +114,7 @@ def _require_whole(path: Path, file: BinaryIO, chunks: int) -> None:
 
 
 def read(path: Path, channels: int) -> F32:
-    """(H, W, ``channels``) float32, row 0 at the bottom; ``channels`` is 3 (R, G and B) or 1 (whichever there is).
+    """(H, W, ``channels``) float32, row 0 at the bottom: 3 (R, G and B), 4 (A as well) or 1 (whichever there is).
 
     Half and integer pixels are converted. Raises UserError where the file is missing, broken or lacks the channels.
     """
@@ -124,22 +124,23 @@ def read(path: Path, channels: int) -> F32:
     except (RuntimeError, ValueError) as error:
         raise UserError(f"{path}: is not a readable EXR ({error})") from error
     colors = found.get("RGB") or found.get("RGBA")  # OpenEXR joins these
-    if colors is not None:
+    if colors is not None and colors.pixels.shape[2] >= channels:
         pixels = colors.pixels[:, :, :channels]
     elif channels == 1 and len(found) == 1:
         pixels = next(iter(found.values())).pixels[:, :, None]
     else:
-        wanted = "one channel" if channels == 1 else "channels R, G and B"
+        wanted = {1: "one channel", 3: "channels R, G and B"}.get(channels, "channels R, G, B and A")
         raise UserError(f"{path}: must have {wanted}, but has {', '.join(found)}")
     return np.ascontiguousarray(pixels[::-1], dtype=np.float32)
 
 
 def write(path: Path, values: F32) -> None:
-    """``values`` (H, W, C) float32, C = 1 (as channel Y) or at least 3 (R, G, B), row 0 at the bottom; lossless.
+    """``values`` (H, W, C) float32, C = 1 (as channel Y), 3 (R, G, B) or 4, row 0 at the bottom; lossless.
 
     Raises UserError where the file cannot be written; it is then as it was before.
     """
-    channels = {"Y": values[::-1, :, 0]} if values.shape[2] == 1 else {"RGB": values[::-1, :, :3]}
+    name = {1: "Y", 3: "RGB", 4: "RGBA"}[values.shape[2]]
+    channels = {name: values[::-1, :, 0] if name == "Y" else values[::-1]}
     arrays = {name: np.ascontiguousarray(pixels, dtype=np.float32) for name, pixels in channels.items()}
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import threading
+from dataclasses import replace
 from pathlib import Path
 from queue import Queue
 from typing import Final
@@ -37,7 +38,8 @@ class LiveRecorder:
         """
         if self._error is not None:
             raise self._error
-        self._queue.put((packet, camera))
+        # Whether frames have gradients changes with the method shown, and a sequence has them in all or none.
+        self._queue.put((replace(packet, temporal_gradient=None), camera))
         self.frames += 1
 
     def close(self) -> None:

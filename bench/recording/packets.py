@@ -48,6 +48,10 @@ def images_of(packet: FramePacket, eye: NDArray[np.float64], extent: float) -> d
     }
     if packet.prev_normal is not None:  # something moves
         found["prev_position"] = np.where(missed, sky, packet.prev_position[..., :3])
+    if packet.specular_albedo is not None:
+        found["roughness"] = packet.specular_albedo[..., 3:4]
+    if packet.temporal_gradient is not None:
+        found["carried"] = packet.direct[..., 3:4]
     for name, image in IMAGES.items():
         values = getattr(packet, image.field) if image.field else None
         if values is not None:
@@ -93,6 +97,10 @@ def packet_of(
     if "direct" not in images or "indirect" not in images:
         fields["direct"] = _with_alpha(images["color"], 1.0)
         fields["indirect"] = _with_alpha(np.zeros_like(images["color"]), 1.0)
+    if "roughness" in images:
+        fields["specular_albedo"][..., 3] = images["roughness"][..., 0]
+    if "carried" in images:
+        fields["direct"][..., 3] = images["carried"][..., 0]
     fields.setdefault("emission", np.zeros((*hit.shape, 4), np.float32))
     albedo = np.where(hit[..., None], images["albedo"], np.float32(0.0))
     return FramePacket(

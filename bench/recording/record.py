@@ -13,7 +13,7 @@ from typing import Any, Final
 
 from bench.recording import converge
 from bench.recording.converge import camera_of
-from bench.recording.layout import IMAGES
+from bench.recording.layout import IMAGES, TOGETHER
 from bench.recording.sequence import read_notes
 from bench.recording.writer import Recording, Stage, open_recording
 from bench.references import ReferenceCache
@@ -39,6 +39,7 @@ class RecordJob:
     frames: int
     samples: int
     out: Path
+    gradients: bool = False
 
     @staticmethod
     def of(args: argparse.Namespace, config: Config) -> RecordJob:
@@ -51,6 +52,7 @@ class RecordJob:
             frames=args.frames,
             samples=args.reference_spp,
             out=args.out,
+            gradients=args.gradients,
         )
 
 
@@ -59,6 +61,7 @@ def run(job: RecordJob, config: Config) -> None:
     require_writable(job.out / ".probe")
     _require_space(job, (config.render.width, config.render.height))
     shot = open_shot(job.scene, config, job.camera, job.animate, job.jitter, positions=True)
+    shot.remember = config.asvgf.remember if job.gradients else ""
     with shot.tracer:
         recording = _open(job, config, shot)
         with _kept(recording):
@@ -80,7 +83,7 @@ def about(shot: Shot, camera: str | None, seed: int) -> dict[str, Any]:
 
 
 def _open(job: RecordJob, config: Config, shot: Shot) -> Recording:
-    noted = about(shot, job.camera, config.render.seed) | {"animate": job.animate}
+    noted = about(shot, job.camera, config.render.seed) | {"animate": job.animate, "gradients": job.gradients}
     stage = Stage(shot.scene.origin, shot.scene.extent, noted)
     return open_recording(job.out, stage, lambda index: camera_of(shot, index, job.jitter), shot.size)
 
@@ -88,7 +91,8 @@ def _open(job: RecordJob, config: Config, shot: Shot) -> Recording:
 def _require_space(job: RecordJob, size: tuple[int, int]) -> None:
     """Raises UserError where the frames will not fit: better now than after an hour."""
     frames = max(0, job.frames - len(read_notes(job.out).get("footprints", [])))
-    channels = sum(image.channels for image in IMAGES.values() if not image.sparse)
+    at_most = {name for group in TOGETHER for name in group}  # what only some scenes have
+    channels = sum(image.channels for name, image in IMAGES.items() if not image.sparse and name not in at_most)
     needed = frames * size[0] * size[1] * channels * 4 * COMPRESSED
     free = shutil.disk_usage(job.out).free
     if needed > free:
@@ -118,6 +122,9 @@ def _record(job: RecordJob, recording: Recording, shot: Shot) -> None:
             f"{recording.folder}: {first} {'frame is' if first == 1 else 'frames are'} there already", file=sys.stderr
         )
     with Progress(f"{shot.scene.scene.name}: recording {count} frames") as progress:
+        # A frame with gradients depends on all before it: they are traced again.
+        for index in range(first if job.gradients and first < count else 0):
+            shot.frame(index)
         for index in range(first, count):
             packet = shot.frame(index)
             with uninterrupted():

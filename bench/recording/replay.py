@@ -16,12 +16,13 @@ import numpy as np
 
 from bench.machine import describe
 from bench.recording import exr
-from bench.recording.scores import Scores
+from bench.recording.scores import HIGHER_IS_BETTER, Scores
 from bench.recording.sequence import Sequence, open_sequence
 from config import Config
 from console import Progress, table
 from errors import UserError
 from gl.context import create_headless
+from gl.pipelines import remembered
 from gl.profiler import Profiler
 from gl.renderer import Renderer, read
 from images import write_png
@@ -71,6 +72,11 @@ def suited(sequence: Sequence, config: Config, denoiser: str) -> Config:
 def prepare(job: ReplayJob, config: Config) -> tuple[Sequence, range, Config]:
     """The sequence, the frames of it that are wanted, and the parameters that suit it. Raises UserError."""
     sequence = open_sequence(job.folder)
+    if remembered(config, job.denoiser) and "gradient" not in sequence.images:
+        raise UserError(
+            f"--denoiser {job.denoiser}: {sequence.folder} has no gradient0.exr, which tells where light changes",
+            "record with --gradients; or, without it: --denoiser svgf --set svgf.fast_clamp=true",
+        )
     return sequence, selected(sequence, job.frames), suited(sequence, config, job.denoiser)
 
 
@@ -153,14 +159,12 @@ def _write(path: Path, content: dict[str, Any]) -> None:
 
 
 def _text(denoiser: str, summary: dict[str, Any]) -> str:
-    """Errors as a table; below the references' own noise they are bounds."""
+    """Errors as a table; where they are no worse than the references' own they are bounds."""
     rows = []
-    for name in ("rmse", "temporal"):
-        if name in summary:
-            floor, value = summary[f"{name}_of_reference"], summary[name]
-            shown = f"< {floor:.4g}" if floor is not None and value <= floor else f"{value:.4g}"
-            noisy = summary.get(f"noisy_{name}")
-            rows.append(
-                [name, shown, "" if noisy is None else f"{noisy:.4g}", "unknown" if floor is None else f"{floor:.4g}"]
-            )
+    for name, value in summary["errors"].items():
+        floor, noisy = summary["of_reference"].get(name), summary["noisy"].get(name)
+        shown = f"{value:.4g}"
+        if summary["means_something"][name] is False:
+            shown = f"{'>' if name in HIGHER_IS_BETTER else '<'} {floor:.4g}"
+        rows.append([name, shown, *("unknown" if other is None else f"{other:.4g}" for other in (noisy, floor))])
     return table(["error", denoiser, "noisy", "of the reference"], rows)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from bench.recording import exr
 from bench.recording.header import Header, read_header
-from bench.recording.layout import HEADER, IMAGES, NOTES, REQUIRED, Image, span
+from bench.recording.layout import HEADER, IMAGES, NOTES, REQUIRED, TOGETHER, Image, span
 from bench.recording.packets import MISS_BELOW, packet_of
 from bench.recording.view import View
 from errors import UserError, did_you_mean
@@ -71,8 +71,8 @@ class Sequence:
         image = IMAGES[name]
         path = image.path(self.folder, index)
         values = exr.read(path, image.channels)
-        if values.shape[:2] != self.size[::-1]:
-            raise _other_size(path, (values.shape[1], values.shape[0]), self.size)
+        if (found := (values.shape[1], values.shape[0])) != image.size(self.size):
+            raise _other_size(path, found, image.size(self.size))
         if name != "world_position":  # of misses it does not count: see packet
             require_finite(path, values)
         return values
@@ -123,6 +123,12 @@ def open_sequence(folder: Path) -> Sequence:
     for name, numbers in found.items():
         if name in IMAGES:
             _require_numbers(folder, IMAGES[name], numbers, header.frames)
+    for group in TOGETHER:
+        if (there := [name for name in group if name in found]) and len(there) < len(group):
+            lacking = next(name for name in group if name not in found)
+            raise UserError(
+                f"{folder}: there is {there[0]}0.exr, but no {lacking}0.exr", f"{', '.join(group)} go together"
+            )
     strangers = sorted(set(found) - set(IMAGES))
     notices = [f"{name}*.exr: not read{did_you_mean(name, IMAGES)}" for name in strangers]
     known = {name: numbers for name, numbers in found.items() if name in IMAGES}
@@ -200,17 +206,18 @@ def _examine(folder: Path, found: Mapping[str, list[int]]) -> tuple[int, int]:
         for number in numbers:
             path = IMAGES[name].path(folder, number)
             facts = exr.examine(path)
-            if size is not None and facts.size != size:
-                raise _other_size(path, facts.size, size)
-            size = facts.size
+            if size is None:
+                size = facts.size  # of color0.exr
+            elif facts.size != IMAGES[name].size(size):
+                raise _other_size(path, facts.size, IMAGES[name].size(size))
     assert size is not None  # every header has a frame, and every frame a color
     return size
 
 
 def _other_size(path: Path, size: tuple[int, int], expected: tuple[int, int]) -> UserError:
     return UserError(
-        f"{path}: {size[0]}x{size[1]} pixels, but color0.exr has {expected[0]}x{expected[1]}",
-        "all images of a sequence have one size",
+        f"{path}: {size[0]}x{size[1]} pixels, but beside color0.exr it must have {expected[0]}x{expected[1]}",
+        "all images of a sequence have one size, but gradient has a pixel for 3x3",
     )
 
 

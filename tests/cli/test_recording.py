@@ -15,6 +15,7 @@ from bench.recording import exr
 from bench.recording.layout import HEADER, NOTES
 from bench.recording.sequence import open_sequence
 from config import load
+from gl.pipelines import remembered
 from gl.renderer import Renderer, read
 from raytrace.frame import FramePacket
 from raytrace.shot import Shot
@@ -42,6 +43,7 @@ def live(denoiser: str, *settings: str) -> list[np.ndarray]:
     ctx = create_headless()
     renderer = Renderer(ctx)
     shot = open_shot("cornell", config, None, animate=True)
+    shot.remember = remembered(config, denoiser)
     with shot.tracer:
         images = [
             read(renderer.run(shot.frame(index), config, denoiser).outputs["radiance"])[..., :3] for index in range(4)
@@ -80,11 +82,15 @@ def test_what_a_replay_writes(app: App, tmp_path: Path, folder: Path) -> None:
     row = timings["frames"][2]
     assert 0.0 < sum(row["passes_ms"].values()) <= row["frame_ms"] <= row["wall_ms"]
     metrics = json.loads((tmp_path / "metrics.json").read_text())
-    summary = metrics["summary"]
-    assert summary["rmse"] < 0.7 * summary["noisy_rmse"]
-    assert 0.0 < summary["rmse_of_reference"] < summary["rmse"]
+    errors, noisy, floor = (metrics["summary"][kind] for kind in ("errors", "noisy", "of_reference"))
+    for name in ("rmse", "relmse", "flip"):
+        assert 0.0 < floor[name] < errors[name] < 0.8 * noisy[name]
+    for name in ("psnr", "ssim"):
+        assert floor[name] > errors[name] > noisy[name]
+    assert 0.0 < floor["temporal"] < errors["temporal"] < noisy["temporal"]
+    assert metrics["summary"]["means_something"] == dict.fromkeys(errors, True)
     assert [row["reference_samples"] for row in metrics["frames"]] == [16] * 4
-    assert "temporal" not in metrics["frames"][0]
+    assert "temporal" not in metrics["frames"][0]["errors"]
     assert "rmse" in out.out
 
 
@@ -95,12 +101,26 @@ def test_an_error_below_the_reference_s_noise_is_only_a_bound(app: App, tmp_path
             (tmp_path / path.name).write_bytes(path.read_bytes())
     notes = json.loads((tmp_path / NOTES).read_text())
     for note in notes["references"].values():
-        note["noise"] = 10.0
+        note["floors"] |= {"rmse": 10.0, "psnr": 3.0}
     (tmp_path / NOTES).write_text(json.dumps(notes))
     out = app("replay", tmp_path, "--out", tmp_path / "out")
-    assert "< 10" in out.out
+    lines = {line.split()[0]: line.split()[1:3] for line in out.out.splitlines()}
+    assert (lines["rmse"], lines["psnr"]) == (["<", "10"], [">", "3"])
     summary = json.loads((tmp_path / "out" / "metrics.json").read_text())["summary"]
-    assert summary["rmse_means_something"] is False
+    assert [name for name, known in summary["means_something"].items() if known is False] == ["rmse", "psnr"]
+
+
+def test_gradients_are_recorded_for_the_method_that_reads_them(app: App, tmp_path: Path, folder: Path) -> None:
+    told = app("replay", folder, "--denoiser", "asvgf", "--out", tmp_path / "out").error()
+    assert f"--denoiser asvgf: {folder} has no gradient0.exr" in told
+    assert "--denoiser svgf --set svgf.fast_clamp=true" in told
+    words = ("record", "--animate", *SMALL, "--gradients", "--out", tmp_path / "box")
+    app(*words, "--frames", "3")
+    app(*words, "--frames", "4")  # goes on as if it had not stopped
+    app("replay", tmp_path / "box", "--denoiser", "asvgf", "--out", tmp_path / "out")
+    for index, expected in enumerate(live("asvgf")):
+        np.testing.assert_array_equal(exr.read(tmp_path / "out" / f"denoised{index}.exr", 3), expected)
+    assert "gradients is True there, not False" in app("record", "--animate", *SMALL, "--out", tmp_path / "box").error()
 
 
 def test_a_part_of_the_frames(app: App, tmp_path: Path, folder: Path) -> None:

@@ -33,11 +33,14 @@ def with_gradients(packet: FramePacket, seed: int, changed: float = 0.3) -> Fram
     now = then * (1 + changed * (random.random((rows, columns, 2)) - 0.7))
     now[random.random((rows, columns, 2)) < 0.3] = 0.0
     values = np.stack([now - then, np.maximum(now, then)], -1).reshape(rows, columns, 4) * there[..., None]
-    direct = packet.direct.copy()
+    direct, indirect = packet.direct.copy(), packet.indirect.copy()
     for row, column in np.argwhere(there):
-        y, x = STRATUM * row + random.integers(3), STRATUM * column + random.integers(3)
-        direct[min(y, height - 1), min(x, width - 1), 3] = 0.0
-    return replace(packet, direct=direct, temporal_gradient=values.astype(np.float32))
+        y, x = (
+            min(STRATUM * row + random.integers(3), height - 1),
+            min(STRATUM * column + random.integers(3), width - 1),
+        )
+        direct[y, x, 3] = indirect[y, x, 3] = 0.0
+    return replace(packet, direct=direct, indirect=indirect, temporal_gradient=values.astype(np.float32))
 
 
 def changing_room(index: int, size: tuple[int, int], changed: float = 0.3) -> FramePacket:
@@ -152,12 +155,14 @@ class AdaptiveOracle(Oracle):
     lambdas: F64 = field(default_factory=lambda: np.zeros(0))
     steps: dict[str, F64] = field(default_factory=dict)
     left: dict[str, F64] = field(default_factory=dict)
+    carried: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, bool))
     _signal: str = ""
 
     def step(self, packet: FramePacket) -> F64:
         p = self.p
         assert isinstance(p, Asvgf)
         assert packet.temporal_gradient is not None
+        self.carried = packet.direct[..., 3] == 0.0
         strata = Strata.of(packet, not p.separate)
         change = packet.temporal_gradient.astype(np.float64)
         if not p.separate:
@@ -194,15 +199,17 @@ class AdaptiveOracle(Oracle):
             length = length * (1 - void) ** p.power
         share = 1 / (length + 1)
 
+        news = np.where(self.carried & known, void, 1.0)  # what was carried over is in the history already
+
         def weight(smallest: float) -> NDArray[np.float64]:
             usual = np.maximum(share, smallest)
-            return np.asarray(np.where(known, usual + (1 - usual) * void, 1.0))[..., None]
+            return np.asarray(np.where(known, news * (usual + (1 - usual) * void), 1.0))[..., None]
 
         color = weight(p.alpha) * sample + (1 - weight(p.alpha)) * before
         moments = weight(p.alpha_moments) * moments + (1 - weight(p.alpha_moments)) * then
         if p.cut == "harmonic":
             length = (length + 1) / (1 + void * length) - 1
         length = np.where(known, length, 0.0)
-        self.left[name] = (length + 1) / (common + 1)
-        found.length = length
+        self.left[name] = (length + news) / (common + 1)
+        found.length = np.maximum(length + news - 1, 0.0)
         return color, moments

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from config import Asvgf, Config, Svgf, Taa, load
+from config import Asvgf, Config, Firefly, Svgf, Taa, load
 from raytrace.frame import STRATUM, FramePacket
 from tests.passes.asvgf_oracle import AdaptiveOracle, changing_room, with_gradients
 from tests.passes.harness import F32, HALF, SIZES, Bench, frame, noise, with_sky
@@ -73,7 +73,7 @@ def test_where_nothing_changed_it_is_svgf_to_the_bit(bench: Bench, separate: boo
             packet = changing_room(index, SIZE)
             assert packet.temporal_gradient is not None
             still = packet.temporal_gradient * np.array([0, 1, 0, 1], np.float32)
-            packet = replace(packet, temporal_gradient=still)
+            packet = replace(room(index, SIZE), temporal_gradient=still)
             radiance.append(bench.denoise(packet, same, denoiser)["radiance"])
     np.testing.assert_array_equal(pictures["svgf"], pictures["asvgf"])
 
@@ -140,6 +140,25 @@ def test_light_that_is_dimmed_is_followed_by_all_of_the_history(bench: Bench) ->
     np.testing.assert_allclose(images[names[1]][..., 0], expected[..., 0], rtol=4 * HALF)
     np.testing.assert_allclose(images[names[1]][..., 1], square, rtol=4 * HALF)
     assert (images[names[1]][..., 3] == moments[..., 3] + 1).all()
+
+
+@pytest.mark.parametrize("separate", [True, False])
+@pytest.mark.parametrize("fireflies", ["off", "clamp", "variance"])
+def test_a_sample_that_is_in_the_history_does_not_count_twice(bench: Bench, separate: bool, fireflies: str) -> None:
+    """Carried over from the last frame and unchanged: neither colour nor length. Changed, as much as λ says."""
+    names = [f"asvgf.{'direct' if separate else 'both'}.accumulate.out_{what}" for what in ("color", "moments")]
+    p = replace(config(separate=separate, follow=False, gain=1.0), firefly=Firefly(mode=fireflies, max_radiance=100.0))
+    for change, color, length in ((0.0, 1.0, 4.0), (-0.5, 1.0 + 0.6 * 0.5 * 2.0, 6 / 3.5 - 1.5), (-1.0, 3.0, 0.0)):
+        bench.restart()
+        for _ in range(5):
+            bench.denoise(wall((18, 12), 0.5, (0, 1, 0, 1)), p, "asvgf")
+        packet = wall((18, 12), 1.5, (change, 1, change, 1))
+        direct, indirect = packet.direct.copy(), packet.indirect.copy()
+        direct[..., 3] = indirect[..., 3] = 0.0
+        images = bench.denoise(replace(packet, direct=direct, indirect=indirect), p, "asvgf", keep=names)
+        scale = 0.5 if separate else 1.0
+        np.testing.assert_allclose(images[names[0]][..., :3], scale * color, rtol=4 * HALF)
+        np.testing.assert_allclose(images[names[1]][..., 3], max(length, 0.0), rtol=4 * HALF, atol=1e-6)
 
 
 def test_no_light_then_and_now_is_no_change(bench: Bench) -> None:

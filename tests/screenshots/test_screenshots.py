@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 import assets
 from config import Config, Taa, load
+from gl.pipelines import remembered
 from gl.renderer import Renderer, read
 from images import to_srgb8
 from raytrace.compiled import compile_scene
@@ -33,6 +34,7 @@ METHODS = {
     "noisy": ("none", Config()),
     "svgf": ("svgf", Config(taa=Taa(enabled=False))),
     "svgf_taa": ("svgf", Config()),
+    "asvgf": ("asvgf", Config(taa=Taa(enabled=False))),
     "bmfr": ("bmfr", Config(taa=Taa(enabled=False))),
     "bmfr_paper": ("bmfr", load(None, ("bmfr.preset=paper", "taa.enabled=false"))),
 }
@@ -40,12 +42,17 @@ GUIDES = ("frame.albedo", "frame.surface", "frame.motion", "frame.emission", "sv
 
 
 @pytest.fixture(scope="module")
-def packets() -> list[FramePacket]:
-    """A flight through the Cornell box, block and lamp moving, seed 0."""
+def films() -> dict[str, list[FramePacket]]:
+    """A flight through the Cornell box, block and lamp moving, seed 0; by which points of it are remembered."""
     scene = compile_scene(assets.build("cornell", animate=True))
     with Tracer(scene) as tracer:
-        shot = Shot(scene, tracer, SIZE, "flight", animate=True)
-        return [shot.frame(index) for index in range(max(FRAMES))]
+        shots = {rule: Shot(scene, tracer, SIZE, "flight", animate=True, remember=rule) for rule in ("", "random")}
+        return {rule: [shot.frame(index) for index in range(max(FRAMES))] for rule, shot in shots.items()}
+
+
+@pytest.fixture(scope="module")
+def packets(films: dict[str, list[FramePacket]]) -> list[FramePacket]:
+    return films[""]
 
 
 @pytest.fixture
@@ -59,9 +66,9 @@ def renderer(ctx: moderngl.Context) -> Iterator[Renderer]:
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_pictures(renderer: Renderer, packets: list[FramePacket], method: str, regenerate: bool) -> None:
+def test_pictures(renderer: Renderer, films: dict[str, list[FramePacket]], method: str, regenerate: bool) -> None:
     denoiser, config = METHODS[method]
-    for number, packet in enumerate(packets, 1):
+    for number, packet in enumerate(films[remembered(config, denoiser)], 1):
         result = renderer.run(packet, config, denoiser)
         if number in FRAMES:
             display = read(result.outputs["display"])[..., :3]

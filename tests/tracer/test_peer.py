@@ -53,8 +53,7 @@ def metallic() -> Scene:
 def blocks(images: F64) -> F64:
     """Means over squares of BLOCK pixels, (n, rows, columns, 3)."""
     n, height, width, _ = images.shape
-    means: F64 = images.reshape(n, height // BLOCK, BLOCK, width // BLOCK, BLOCK, 3).mean(axis=(2, 4))
-    return means
+    return np.asarray(images.reshape(n, height // BLOCK, BLOCK, width // BLOCK, BLOCK, 3).mean(axis=(2, 4)))
 
 
 @pytest.mark.parametrize("make", [cornell, textured, metallic])

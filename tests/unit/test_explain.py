@@ -80,12 +80,13 @@ def test_the_tracer_does_what_the_scene_needs(subject: Subjects) -> None:
     assert lines[0].startswith("tracer: up to 2 rays per path")
     for kind in ("shadow at hit 1", "shadow at hit 2"):
         assert row(lines, "ray", kind).endswith("left out: there is no light")
-    assert "second_hit without an environment, a sky, lamps, lights" in " ".join(" ".join(lines).split())
+    told = " ".join(" ".join(lines).split()).partition("kernel second_hit ")[2]
+    assert re.match(r"without (\w[^,]*, )*an environment, a sky, lamps, lights without a surface, textures", told)
     assert "one scene" in row(lines, "Embree")
 
     shining = " ".join(" ".join(tracer_section(subject(glossy()))).split())
-    assert "guides with a sky, metals and gloss, textures; without" in shining
-    assert "first_hit with a sky, lamps, textures; without an environment, lights" in shining
+    assert re.search(r"guides with [^;]*a sky, [^;]*metals and gloss, [^;]*textures; without", shining)
+    assert re.search(r"first_hit with [^;]*a sky, lamps, [^;]*textures; without", shining)
 
 
 def test_there_are_words_for_every_switch_of_a_kernel(subject: Subjects) -> None:

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from bench.recording import exr
-from bench.recording.layout import IMAGES
+from bench.recording.layout import IMAGES, TOGETHER
 from bench.recording.packets import images_of
 from bench.recording.sequence import Sequence, open_sequence
 from bench.recording.view import View, matrix_of
+from bench.recording.writer import Recording, Stage
+from errors import UserError
 from raytrace.camera import Camera
 from raytrace.frame import FramePacket
 from tests.unit.documents import table
@@ -40,7 +42,7 @@ def without(folder: Path, *names: str) -> Sequence:
 
 def test_what_was_written_is_read_to_the_bit(recording: tuple[Sequence, list[FramePacket]]) -> None:
     sequence, packets = recording
-    written = {name for name, image in IMAGES.items() if not image.sparse}
+    written = {name for name, image in IMAGES.items() if not image.sparse} - {n for group in TOGETHER for n in group}
     assert set(sequence.images) == written
     with opened() as shot:
         for packet in packets:
@@ -72,6 +74,38 @@ def test_every_image_of_a_packet_is_recorded_or_derived() -> None:
     left_out = {"position", "prev_position"}  # of no use to the filters
     images = {field.name for field in fields(FramePacket) if "F32" in str(field.type)}
     assert stored | derived | left_out == images
+
+
+@pytest.mark.parametrize("group", TOGETHER)
+def test_what_only_some_frames_have_comes_back_to_the_bit(tmp_path: Path, group: tuple[str, ...]) -> None:
+    rng = np.random.default_rng(6)
+    width, height = SIZE
+
+    def noise(*size: int) -> np.ndarray:
+        return rng.random((*size, 4)).astype(np.float32)
+
+    with opened() as shot:
+        plain = shot.frame(0)
+        if "gradient" in group:
+            direct = plain.direct.copy()
+            direct[..., 3] = rng.integers(0, 3, (height, width))
+            packet = replace(plain, direct=direct, temporal_gradient=noise(-(-height // 3), -(-width // 3)))
+        else:
+            specular = noise(height, width)
+            specular[..., 3] = 1.0
+            packet = replace(plain, specular=specular, specular_albedo=noise(height, width))
+        recording = Recording(tmp_path, Stage(shot.scene.origin, shot.scene.extent, {}))
+        recording.add(packet, shot.camera(0))
+        recording.flush()
+    sequence = open_sequence(tmp_path)
+    assert set(group) <= set(sequence.images)
+    found = sequence.packet(0, cut=True)
+    for field in ("direct", "specular", "specular_albedo", "temporal_gradient"):
+        before, after = getattr(packet, field), getattr(found, field)
+        assert (before is None and after is None) or np.array_equal(before, after), field
+    (tmp_path / f"{group[-1]}0.exr").unlink()
+    with pytest.raises(UserError, match=rf"there is {group[0]}0\.exr, but no {group[-1]}0\.exr"):
+        open_sequence(tmp_path)
 
 
 def test_the_table_in_the_documentation_is_that_of_the_program() -> None:
@@ -150,6 +184,43 @@ def test_half_precision_will_do(tmp_path: Path, names: tuple[str, ...]) -> None:
     np.testing.assert_allclose(lengths[hit], 1.0, rtol=1e-6)
     np.testing.assert_allclose(rough.surface, exact.surface, rtol=2e-3, atol=2e-3)
     assert np.abs(rough.motion[hit][:, :2]).max() == 0.0
+
+
+def test_an_object_of_number_minus_one_is_a_miss(tmp_path: Path) -> None:
+    foreign(tmp_path, frames=1)
+    before = open_sequence(tmp_path).packet(0)
+    ids = np.full((12, 20, 1), 3.0, np.float32)
+    ids[:2] = -1.0
+    assert (before.motion[:2, :, 3] == 0.0).all()
+    exr.write(tmp_path / "object_id0.exr", ids)
+    packet = open_sequence(tmp_path).packet(0)
+    assert (packet.motion[:2, :, 3] == -1.0).all()
+    assert (packet.surface[:2] == 0.0).all()
+    assert (packet.albedo[:2] == 0.0).all()
+    assert set(np.unique(packet.motion[2:, :, 3])) == {-1.0, 3.0}
+
+
+def test_a_point_that_was_behind_the_camera_is_found_nowhere(tmp_path: Path) -> None:
+    """Its projection lies in the picture, upside down: a history must not be taken from there."""
+    foreign(tmp_path)
+    for index in range(3):
+        images = exr.read(tmp_path / f"world_position{index}.exr", 3)
+        behind = 2.0 * np.asarray(EYE.position, dtype=np.float32) - images
+        exr.write(tmp_path / f"prev_position{index}.exr", behind)
+    packet = open_sequence(tmp_path).packet(1)
+    hit = packet.motion[..., 3] >= 0.0
+    assert (packet.motion[hit][:, :2] == 2.0).all()
+    assert (packet.motion[hit][:, 2] <= 0.0).all()
+
+
+def test_a_cut_moves_nothing(tmp_path: Path) -> None:
+    with opened() as shot:
+        recorded(tmp_path, shot, 2)
+    sequence = without(tmp_path, "prev_position", "prev_normal")
+    assert np.abs(sequence.packet(1).motion[..., :2]).max() > 1e-4
+    packet = sequence.packet(1, cut=True)
+    assert packet.cut
+    assert (packet.motion[..., :2] == 0.0).all()
 
 
 def test_normals_need_not_have_length_one(tmp_path: Path) -> None:

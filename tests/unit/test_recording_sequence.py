@@ -118,7 +118,7 @@ MISTAKES: dict[str, tuple[Callable[[Path], object], str]] = {
     "empty": (lambda folder: (folder / "color2.exr").write_bytes(b""), "color2.exr: is empty"),
     "half written": (cut("color2.exr", 0.6), "color2.exr: is only half written"),
     "other channels": (channels, "color0.exr: must have channels R, G and B, but has Y"),
-    "other size": (smaller, "shading_normal2.exr: 20x11 pixels, but color0.exr has 20x12"),
+    "other size": (smaller, "shading_normal2.exr: 20x11 pixels, but beside color0.exr it must have 20x12"),
     "nan": (set_pixel(np.nan), "albedo1.exr: NaN or infinite at 1 pixel, the first in column 2 of row 1 from the top"),
     "infinite": (set_pixel(np.inf), "albedo1.exr: NaN or infinite at 1 pixel"),
     "a folder in the way": (

@@ -16,7 +16,8 @@ layout(location = 0) out vec4 out_color;
 
 void main() {
     ivec2 p = ivec2(gl_FragCoord.xy);
-    vec3 c = texelFetch(in_direct, p, 0).rgb;
+    vec4 direct = texelFetch(in_direct, p, 0); // a: where the sample comes from, handed on
+    vec3 c = direct.rgb;
 #if HAS_IN_INDIRECT
     c += texelFetch(in_indirect, p, 0).rgb;
 #endif
@@ -26,5 +27,5 @@ void main() {
 #ifdef GLOSSY
     c += texelFetch(in_specular, p, 0).rgb * texelFetch(in_specular_albedo, p, 0).rgb;
 #endif
-    out_color = vec4(c, 1.0);
+    out_color = vec4(c, direct.a);
 }

@@ -11,7 +11,8 @@ layout(location = 0) out vec4 out_color;
 
 void main() {
     ivec2 p = ivec2(gl_FragCoord.xy), size = textureSize(in_color, 0);
-    vec3 c = texelFetch(in_color, p, 0).rgb;
+    vec4 sampled = texelFetch(in_color, p, 0); // a: where it comes from, handed on
+    vec3 c = sampled.rgb;
 
     // 7x7 without the pixel itself: an outlier would vouch for itself, being at most sqrt(48) deviations from the mean.
     vec3 mean = vec3(0.0), square = vec3(0.0);
@@ -31,5 +32,5 @@ void main() {
         vec3 variance = max(square / count - mean * mean, u_least_variance);
         c = min(c, u_margin + mean + u_deviations * sqrt(variance)); // the excess is subtracted
     }
-    out_color = vec4(c, 1.0);
+    out_color = vec4(c, sampled.a);
 }

@@ -98,7 +98,8 @@ void main() {
     for (int i = 0; i <= last; ++i)
         if ((mask & (16 << i)) != 0) gather(centre + ivec2(i % 3 - 1, i / 3 - 1), 1.0);
 
-    float n = 0.0, void_share = 0.0; // frames behind the history, and what of it the change of light takes away
+    // Frames behind the history, what of it the change of light takes away, and what of this frame's sample is news.
+    float n = 0.0, void_share = 0.0, news = 1.0;
     if (total > 0.0) {
         color /= total;
         moments /= total;
@@ -118,13 +119,15 @@ void main() {
         float factor = change[2 + SIGNAL];
         color = clamp_radiance(color * factor);
         moments *= vec2(factor, factor * factor);
+        // A sample that was carried over from the last frame is in the history already, unless its light has changed.
+        if (texelFetch(in_color, p, 0).a == 0.0) news = void_share;
 #if POWER
         n *= pow(max(1.0 - void_share, 1e-9), u_power); // pow(0, 0) is undefined
 #endif
 #endif
         float share = 1.0 / (n + 1.0);
-        c = usable ? mix(color, c, mix(max(share, u_alpha), 1.0, void_share)) : color;
-        m = usable ? blend_moments(moments, l, mix(max(share, u_alpha_moments), 1.0, void_share)) : moments;
+        c = usable ? mix(color, c, news * mix(max(share, u_alpha), 1.0, void_share)) : color;
+        m = usable ? blend_moments(moments, l, news * mix(max(share, u_alpha_moments), 1.0, void_share)) : moments;
     }
 #ifdef CENTRED
     float variance = m.y;
@@ -142,7 +145,7 @@ void main() {
 #if !POWER
     n = max((n + 1.0) / (1.0 + void_share * n) - 1.0, 0.0);
 #endif
-    out_moments = vec4(m, (n + 1.0) / (found.w + 1.0), n);
+    out_moments = vec4(m, (n + news) / (found.w + 1.0), max(n - (1.0 - news), 0.0));
 #else
     out_moments = m;
 #endif
