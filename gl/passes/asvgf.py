@@ -13,7 +13,7 @@ Deviations from the paper, in every preset; docs/asvgf.md has the measurements:
 
 The preset ``best`` lets the history follow the light (``follow``): what was accumulated is multiplied by the factor
 that the light has changed by. λ as published says which part of the light is new, a few per cent in every frame of a
-moving lamp, and shortens a history of ten frames by as little. ``gain`` multiplies it; ten works, at the price of noise.
+moving lamp, and shortens a history of ten frames by as little. ``gain`` multiplies it; ten works, but is noisy.
 """
 
 from __future__ import annotations
