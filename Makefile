@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv/bin/python
 ARGS ?=
 
-.PHONY: run test bench lint references clean
+.PHONY: run test bench report lint references clean
 
 run:        ## open the window (without a display: the headless demo); ARGS="--scene interior" passes flags on
 	@$(PYTHON) tools/setup.py run
@@ -15,6 +15,11 @@ test: lint  ## lint, types, every test
 bench:      ## the measured table of the README
 	@$(PYTHON) tools/setup.py run
 	$(VENV) app.py bench --table $(ARGS)
+	$(VENV) -m bench.features
+
+report:     ## the same as a page with diagrams and pictures: out/bench.html; ARGS="--quick" for a look
+	@$(PYTHON) tools/setup.py run
+	$(VENV) app.py bench --html $(ARGS)
 
 lint:
 	@$(PYTHON) tools/setup.py test

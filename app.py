@@ -7,12 +7,15 @@ import os
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import cli
 import config as configuration
-from config import Config
+from config import Config, Surroundings
 from errors import UserError
+
+if TYPE_CHECKING:
+    from bench.recording.replay import ReplayJob
 
 
 def load_config(args: argparse.Namespace) -> Config:
@@ -23,7 +26,10 @@ def load_config(args: argparse.Namespace) -> Config:
         changes["width"], changes["height"] = args.size
     if getattr(args, "seed", None) is not None:
         changes["seed"] = args.seed
-    return replace(config, render=replace(config.render, **changes))
+    surroundings = config.surroundings
+    if getattr(args, "environment", None) is not None:
+        surroundings = Surroundings(args.environment, args.environment_strength, args.environment_rotation)
+    return replace(config, render=replace(config.render, **changes), surroundings=surroundings)
 
 
 def has_display() -> bool:
@@ -59,10 +65,28 @@ def run(argv: Sequence[str]) -> int:
 
         headless.render(headless.RenderJob.of(args, config), config)
     elif args.command == "bench":
+        if args.hard:
+            from bench.hard import cases
+
+            cases.run(args.out)
+            return 0
         from bench import command
 
-        command.run(config, tuple(args.scene or ("cornell", "interior")), args.quick, args.out)
+        command.run(config, tuple(args.scene or ("cornell", "interior")), args.quick, args.out, args.html)
+    elif args.command == "record":
+        from bench.recording import record
+
+        record.run(record.RecordJob.of(args, config), config)
+    elif args.command == "replay":
+        from bench.recording import replay
+
+        job = replay.ReplayJob.of(args)
+        if args.window:
+            play(job, config)
+        else:
+            replay.run(job, config)
     elif has_display():
+        from bench.recording import live
         from ui import window
 
         window.run(
@@ -76,6 +100,7 @@ def run(argv: Sequence[str]) -> int:
                 hud=not args.no_hud,
                 calibrate=args.size is None,
                 log=args.log,
+                recorder=live.new_recorder,
             ),
         )
     else:
@@ -84,6 +109,28 @@ def run(argv: Sequence[str]) -> int:
         print("no display, hence no window: a demo is rendered instead (pictures of your own: app.py render --help)")
         demo.run(config, args.scene, args.camera, args.out)
     return 0
+
+
+def play(job: ReplayJob, config: Config) -> None:
+    """Recorded frames in the window. Raises UserError where they or a window cannot be had."""
+    if not has_display():
+        raise UserError("--window: there is no display to open a window on", "without --window it writes files")
+    from bench.recording import live, replay
+    from ui import window
+
+    sequence, frames, config = replay.prepare(job, config)
+    wishes = window.Wishes(
+        scene=sequence.name,
+        denoiser=job.denoiser,
+        camera="still",
+        animate=True,
+        out=job.out,
+        hud=True,
+        calibrate=False,
+        log=job.log,
+        recorder=live.new_recorder,
+    )
+    window.play(sequence, frames[0], frames[-1] + 1, config, wishes)
 
 
 def main() -> int:

@@ -6,6 +6,7 @@ Standard library only, and nothing that compiles or opens a device: ``--help`` a
 from __future__ import annotations
 
 import argparse
+import math
 import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -14,7 +15,11 @@ from typing import Any, NoReturn
 from errors import UserError, did_you_mean
 
 ROOT = Path(__file__).resolve().parent
-DENOISERS = ("none", "accumulate", "svgf", "asvgf", "bmfr", "reference")
+DENOISERS = (
+    *("none", "accumulate", "svgf", "asvgf", "bmfr"),
+    *("gaussian", "bilateral", "joint", "joint-separable", "atrous", "atrous-jitter", "guided"),
+    "reference",
+)
 LARGEST_SIDE = 16384
 SCENE_FILES = ".glb .gltf .obj .ply"
 
@@ -101,7 +106,49 @@ def _add_denoiser(parser: Parser, known: Sequence[str], text: str) -> None:
 
 def _add_scene(parser: Parser) -> None:
     parser.add_argument(
-        "--scene", default="cornell", metavar="S", help=f"cornell, interior, or a file: {SCENE_FILES} (default cornell)"
+        "--scene",
+        default="cornell",
+        metavar="S",
+        help=f"one of app.py scenes, or a file: {SCENE_FILES} (default cornell)",
+    )
+    _add_environment(parser)
+
+
+def number(flag: str, lowest: float, highest: float) -> Callable[[str], float]:
+    """Reads a finite number in [lowest; highest]; what it returns raises UserError."""
+
+    def read(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not lowest <= value <= highest:
+            raise UserError(f"{flag} {text}: must be a number in [{lowest:g};{highest:g}]")
+        return value
+
+    return read
+
+
+def _add_environment(parser: Parser) -> None:
+    parser.add_argument(
+        "--environment",
+        type=Path,
+        metavar="FILE",
+        help="light from all around: an equirectangular picture, .hdr or .exr, instead of the scene's sky",
+    )
+    parser.add_argument(
+        "--environment-strength",
+        type=number("--environment-strength", 0.0, 1e6),
+        default=1.0,
+        metavar="X",
+        help="what it is multiplied by (default 1)",
+    )
+    parser.add_argument(
+        "--environment-rotation",
+        type=number("--environment-rotation", -360.0, 360.0),
+        default=0.0,
+        metavar="DEG",
+        help="degrees by which it is turned about the y axis, counter-clockwise seen from above (default 0)",
     )
 
 
@@ -153,7 +200,8 @@ def window_parser() -> Parser:
     parser.add_argument(
         "--camera",
         metavar="C",
-        help="still, flight (if the scene has one), or the file of a camera path; see app.py render --help. "
+        help="still, flight (if the scene has one), one of the file's cameras by name, or the file of a camera path; "
+        "see app.py render --help. "
         "Default: still in the window, flight in the demo",
     )
     parser.add_argument("--no-hud", action="store_true", help="begin without the panel over the picture; G shows it")
@@ -176,7 +224,13 @@ def render_parser() -> Parser:
         "app.py render",
         "Render frames 0 to N-1 of a shot and write the last as PNG; prints the name of each file written.\n"
         "The picture is after anti-aliasing and tone mapping. Scene time advances by 1/30 s per frame.",
-        "A camera path is JSON; its last camera stays to the end:\n"
+        "A camera path is TOML, keyframes with a smooth curve between them, such as the window records with C:\n"
+        "  [[key]]\n"
+        "  time = 0.0                     # seconds\n"
+        "  position = [2.25, 1.5, 2.0]\n"
+        "  target = [-0.4, 1.0, -1.1]     # or forward = [x, y, z], a direction\n"
+        "  yfov = 45.0                    # degrees from bottom to top; may be left out, as may up = [x, y, z]\n"
+        "or JSON, a camera for each frame; its last camera stays to the end:\n"
         '  {"frames": [{"camera_to_world_gl": [[..4..], [..4..], [..4..], [..4..]], "yfov_deg": 45}, ...]}\n'
         "The matrix acts on column vectors and has OpenGL's axes: x right, y up, looking along -z.\n\n"
         "examples:\n"
@@ -211,7 +265,8 @@ def render_parser() -> Parser:
         "--camera",
         default="still",
         metavar="C",
-        help="still, flight (if the scene has one), or the file of a camera path, see below (default still)",
+        help="still, flight (if the scene has one), one of the file's cameras by name, or the file of a camera path, "
+        "see below (default still)",
     )
     parser.add_argument("--animate", action="store_true", help="objects and lamps move, where the scene has such")
     parser.add_argument(
@@ -282,17 +337,107 @@ def bench_parser() -> Parser:
     parser = Parser(
         "app.py bench",
         "Measure every denoiser on the same traced frames: time, and error and flicker against references of 1024\n"
-        "paths per pixel; and the tracer's time. Prints tables and writes JSON. References are kept in .cache/: only\n"
-        "the first run takes long.",
-        "examples:\n  app.py bench --quick\n  app.py bench --scene cornell --out out/cornell.json",
+        "paths per pixel; path tracing in the same time; and the tracer's time. Prints tables, writes JSON and CSV.\n"
+        "References are kept in .cache/: only the first run takes long.",
+        "examples:\n  app.py bench --quick\n  app.py bench --html --size 320x180\n"
+        "  app.py bench --scene cornell --out out/cornell.json\n"
+        "  app.py bench --hard --out out/hard.json                     inputs on which formulas as printed fail",
     )
     parser.add_argument("--scene", action="append", metavar="S", help="repeatable (default: cornell and interior)")
+    _add_environment(parser)
     parser.add_argument("--quick", action="store_true", help="small pictures, few samples: does it run, not how fast")
+    parser.add_argument(
+        "--hard",
+        action="store_true",
+        help="measure the hard cases instead (see docs/hard_cases.md): exact answer, error, what no care would give",
+    )
     parser.add_argument("--table", action="store_true", help="print tables: the default, for those who say so")
+    parser.add_argument(
+        "--html", action="store_true", help="also write a page with diagrams and pictures, OUT with suffix .html"
+    )
     _add_size(parser)
     parser.add_argument(
         "--out", type=Path, default=Path("out/bench.json"), metavar="JSON", help="default out/bench.json"
     )
+    _add_settings(parser)
+    return parser
+
+
+def frame_range(text: str) -> tuple[int | None, int | None]:
+    """``10:20`` to (10, 20); either may be left out. Raises UserError."""
+    match = re.fullmatch(r"(\d{1,9})?:(\d{1,9})?", text.strip(), re.ASCII)
+    if not match:
+        raise UserError(f"--frames {text}: must be A:B, from frame A up to frame B - 1, as in 10:20, 10: or :20")
+    first, end = (None if number is None else int(number) for number in match.groups())
+    return first, end
+
+
+def record_parser() -> Parser:
+    parser = Parser(
+        "app.py record",
+        "Record frames 0 to N-1 of a shot, and with --reference-spp converged references of them, to a folder in the\n"
+        "layout of the BMFR data set: noisy illumination, guides and camera matrices. app.py replay filters them.\n"
+        "Interrupted, it keeps what there is; the same command goes on. More --frames or paths continue as well.",
+        "examples:\n"
+        "  app.py record --frames 60 --out out/cornell\n"
+        "  app.py record --scene interior --animate --frames 24 --size 320x180 --reference-spp 1024 --out out/interior",
+    )
+    _add_scene(parser)
+    _add_size(parser)
+    parser.add_argument(
+        "--frames", type=whole("--frames", 1, 1_000_000), default=60, metavar="N", help="how many (default 60)"
+    )
+    parser.add_argument(
+        "--camera",
+        metavar="C",
+        help="still, flight, or the file of a camera path, see app.py render --help "
+        "(default: the scene's flight, still if it has none)",
+    )
+    parser.add_argument("--animate", action="store_true", help="objects and lamps move, where the scene has such")
+    parser.add_argument(
+        "--jitter", action="store_true", help="shift the camera within the pixel from frame to frame (default: not)"
+    )
+    parser.add_argument(
+        "--gradients",
+        action="store_true",
+        help="with temporal gradients, for replay --denoiser asvgf; a ninth of the samples then repeat earlier paths",
+    )
+    parser.add_argument(
+        "--reference-spp",
+        type=whole("--reference-spp", 1, 10_000_000),
+        default=0,
+        metavar="M",
+        help="paths per pixel of a reference for each frame (default: no references)",
+    )
+    parser.add_argument(
+        "--out", type=Path, default=Path("out/recording"), metavar="DIR", help="folder (default out/recording)"
+    )
+    _add_seed(parser)
+    _add_settings(parser)
+    return parser
+
+
+def replay_parser() -> Parser:
+    parser = Parser(
+        "app.py replay",
+        "Filter recorded frames, without any scene: those of app.py record, or any in the layout of the BMFR data set\n"
+        "(docs/recording.md). Writes denoised{i}.exr (linear radiance), display{i}.png, timings.json and, where there\n"
+        "are references, metrics.json.",
+        "examples:\n"
+        "  app.py replay out/cornell\n"
+        "  app.py replay out/cornell --denoiser bmfr --frames 10:20 --out out/bmfr\n"
+        "  app.py replay out/cornell --window",
+    )
+    parser.add_argument("folder", type=Path, metavar="DIR", help="folder of the recording")
+    _add_denoiser(parser, DENOISERS[:-1], "what to filter with (default svgf)")
+    parser.add_argument(
+        "--frames", type=frame_range, default=(None, None), metavar="A:B", help="from A up to B - 1 (default: all)"
+    )
+    parser.add_argument("--out", type=Path, default=Path("out/replay"), metavar="DIR", help="default out/replay")
+    parser.add_argument(
+        "--window", action="store_true", help="play them in the window, again and again; writes nothing"
+    )
+    parser.add_argument("--log", action="store_true", help="with --window: print what changes in it")
     _add_settings(parser)
     return parser
 
@@ -318,6 +463,8 @@ COMMANDS: dict[str, tuple[str, Callable[[], Parser]]] = {
     "graph": ("print the passes of one frame, as text or Graphviz", graph_parser),
     "explain": ("say what a scene and a denoiser need, what it costs, and why", explain_parser),
     "bench": ("measure time and error of the denoisers", bench_parser),
+    "record": ("record frames and references to a folder", record_parser),
+    "replay": ("filter recorded frames, of this program or of others", replay_parser),
     "scenes": ("list the scenes that come with the program", scenes_parser),
     "doctor": ("say what is missing on this machine, and what to do", doctor_parser),
 }

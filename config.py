@@ -36,6 +36,9 @@ class Render(Section):
     )
     threads: int = param(0, 0, 256, "[0;256] threads that trace; 0: one for each core", live=False)
     tile: int = param(16384, 256, 1048576, "[256;1048576] pixels traced by one thread in one go", live=False)
+    regularize: bool = param(
+        True, doc="widen narrow specular lobes at a path's second hit; never in references", live=False
+    )
 
 
 @dataclass(frozen=True)
@@ -87,6 +90,12 @@ class Svgf(Section):
     variance_guided: bool = param(
         True, doc="steer the luminance weight by the variance", structural=True, heading="variance"
     )
+    variance: str = param(
+        "raw",
+        choices=("raw", "raw-mean", "welford", "welford-mean", "spatial", "spatial-temporal", "exaggerated"),
+        doc="how it is estimated: over time from raw or centred moments, in space, in both, or a hundredfold",
+        structural=True,
+    )
     accumulated_variance: bool = param(
         True, doc="scale the variance to that of the accumulated colour after the first iteration", structural=True
     )
@@ -100,6 +109,10 @@ class Svgf(Section):
     sigma_n: int = param(128, 1, 1024, "[1;1024] exponent of the cosine between normals; more: sharper")
     sigma_l: float = param(4.0, 0.01, 1000, "[0.01;1000] tolerance for luminance, in standard deviations of the noise")
     first_sigma_l: float = param(4.0, 0.1, 1000, "[0.1;1000] sigma_l of the first iteration, in sigma_l of the others")
+    sigma_r: float = param(0.1, 0.001, 100, "[0.001;100] tolerance for roughness, of specular light only")
+    reach: float = param(
+        30.0, 1, 1e6, "[1;1000000] distance over which specular light is averaged, pixels per squared roughness"
+    )
 
     @property
     def feedback(self) -> int:
@@ -151,6 +164,7 @@ class Bmfr(Section):
     preset: str = param(
         "best", choices=("paper", "reference", "best"), doc="values for the keys of this section that are not set"
     )
+    separate: bool = param(True, doc="fit diffuse and specular light apart", structural=True)
     demodulate: bool = param(True, doc="fit illumination, without the surfaces' albedo", structural=True)
     temporal: bool = param(True, doc="accumulate over time, samples and fits", structural=True, heading="accumulation")
     max_history: int = param(255, 10, 255, "[10;255] longest history counted, in frames")
@@ -158,6 +172,9 @@ class Bmfr(Section):
         4.0, 0.5, 1000, "[0.5;1000] largest distance between points of a history, in widths of a pixel on the surface"
     )
     normal_tolerance: float = param(0.1, 0, 4, "[0;4] largest squared distance between normals of a history")
+    follow_motion: bool = param(
+        True, doc="look for the history of what moves where it was, not where it is now", structural=True
+    )
     round_history: bool = param(True, doc="round the history's length before it is used", structural=True)
     alpha: float = param(0.2, 0, 1, "[0;1] smallest share of the new frame before the fit; 0: running mean")
     alpha_fit: float = param(0.1, 0, 1, "[0;1] smallest share of the new fit; 0: running mean")
@@ -190,6 +207,14 @@ class Bmfr(Section):
     caution: float = param(
         1.5, 0, 100, "[0;100] doubt in a part's own fit: variances that noise is expected to explain in each feature"
     )
+    short_history: int = param(
+        0,
+        0,
+        16,
+        "[0;16] frames: parts whose samples have fewer are doubted as fresh_caution says; 0: as all are",
+        structural=True,
+    )
+    fresh_caution: float = param(1.0, 0, 100, "[0;100] that doubt; less: smaller blocks where the history is short")
     unit_scale: bool = param(False, doc="scale positions to [0, 1] in every block, not to [-1, 1]", structural=True)
     regularization: str = param(
         "both",
@@ -207,14 +232,83 @@ class Bmfr(Section):
         names = self.features.split(",")
         if names[0] != "1":
             raise UserError(f'[bmfr] features: must begin with the constant, "1", not {names[0]!r}')
-        if "roughness" in names:
-            raise UserError("[bmfr] features: frames have no roughness yet, every surface is diffuse")
 
     @property
     def part_side(self) -> int:
         """``part`` as far as the block can be cut so: the nearer of its half and its quarter, 0 if there are none."""
         sides = [self.block // n for n in (2, 4) if self.block % n == 0]
         return min(sides, key=lambda side: abs(side - self.part), default=0) if self.part else 0
+
+
+@dataclass(frozen=True)
+class Spatial(Section):
+    """What the filters in space have in common: when they blend over time, and the edges that stop them."""
+
+    demodulate: bool = param(True, doc="filter illumination, without the surfaces' albedo", structural=True)
+    temporal: bool = param(True, doc="accumulate over time", structural=True, heading="accumulation")
+    order: str = param(
+        "filter-first",
+        choices=("filter-first", "blend-first"),
+        doc="blend filtered frames over time, or filter what was blended",
+        structural=True,
+    )
+    alpha: float = param(0.1, 0, 1, "[0;1] smallest share of the new frame; 0: running mean")
+    max_history: int = param(255, 10, 255, "[10;255] longest history counted, in frames")
+    depth_tolerance: float = param(0.01, 0, 1, "[0;1] largest depth difference accepted in history, part of the depth")
+    normal_tolerance: float = param(0.9, -1, 1, "[-1;1] smallest cosine between normals accepted in history")
+    sigma_z: float = param(
+        1.0,
+        0.01,
+        100,
+        "[0.01;100] joint, à-trous: tolerance for depth, in depth slopes of the surface",
+        heading="edges",
+    )
+    sigma_n: int = param(128, 1, 1024, "[1;1024] joint, à-trous: exponent of the cosine between normals; more: sharper")
+
+
+@dataclass(frozen=True)
+class Gaussian(Section):
+    """Gaussian blur, which knows no edges."""
+
+    sigma_d: float = param(2.0, 0.5, 8, "[0.5;8] width, in pixels: standard deviation")
+    separable: bool = param(True, doc="rows, then columns: the same picture for fewer taps", structural=True)
+
+
+@dataclass(frozen=True)
+class Bilateral(Section):
+    """Bilateral filter (Tomasi and Manduchi 1998)."""
+
+    sigma_d: float = param(3.0, 0.5, 8, "[0.5;8] width, in pixels: standard deviation")
+    sigma_r: float = param(1.0, 0.001, 1000, "[0.001;1000] tolerance for colour, in radiance of a white surface")
+
+
+@dataclass(frozen=True)
+class Joint(Section):
+    """Joint bilateral filter (Petschnigg et al. 2004, Eisemann and Durand 2004), whole or approximated separably."""
+
+    sigma_d: float = param(4.0, 0.5, 8, "[0.5;8] width, in pixels: standard deviation")
+
+
+@dataclass(frozen=True)
+class Atrous(Section):
+    """Edge-avoiding à-trous wavelet with tolerances set by hand (Dammertz et al. 2010), all taps or some of them."""
+
+    iterations: int = param(5, 0, 8, "[0;8] à-trous iterations; number i takes every 2^i-th pixel", structural=True)
+    sigma_l: float = param(
+        1.0, 0.001, 1000, "[0.001;1000] tolerance for luminance in the first iteration, in radiance of a white surface"
+    )
+    halve: bool = param(True, doc="halve the tolerance for luminance in every iteration")
+    taps: int = param(8, 1, 24, "[1;24] atrous-jitter: taps of an iteration besides the centre", structural=True)
+
+
+@dataclass(frozen=True)
+class Guided(Section):
+    """Guided filter (He et al. 2010, Bauszat et al. 2011)."""
+
+    radius: int = param(8, 1, 32, "[1;32] half a window's side, in pixels")
+    epsilon: float = param(
+        0.01, 1e-6, 1, "[1e-06;1] doubt in the guides: variance of a guide below which it says little"
+    )
 
 
 @dataclass(frozen=True)
@@ -247,6 +341,19 @@ class Display(Section):
 
 
 @dataclass(frozen=True)
+class Surroundings:
+    """The picture of light from all around that a scene gets instead of its own sky; ``file`` None: none.
+
+    ``strength`` multiplies it; ``rotation``: degrees about the y axis, counter-clockwise seen from above. No section
+    of the file: it goes with a scene, not with the program, and has flags of its own.
+    """
+
+    file: Path | None = None
+    strength: float = 1.0
+    rotation: float = 0.0
+
+
+@dataclass(frozen=True)
 class Config:
     """Every parameter. Immutable and hashable: a changed one is a new Config (``dataclasses.replace``)."""
 
@@ -255,8 +362,15 @@ class Config:
     svgf: Svgf = field(default_factory=Svgf)
     asvgf: Asvgf = field(default_factory=Asvgf)
     bmfr: Bmfr = field(default_factory=Bmfr)
+    spatial: Spatial = field(default_factory=Spatial)
+    gaussian: Gaussian = field(default_factory=Gaussian)
+    bilateral: Bilateral = field(default_factory=Bilateral)
+    joint: Joint = field(default_factory=Joint)
+    atrous: Atrous = field(default_factory=Atrous)
+    guided: Guided = field(default_factory=Guided)
     taa: Taa = field(default_factory=Taa)
     display: Display = field(default_factory=Display)
+    surroundings: Surroundings = field(default_factory=Surroundings)
 
 
 SECTIONS: dict[str, type[Section]] = {
@@ -265,6 +379,12 @@ SECTIONS: dict[str, type[Section]] = {
     "svgf": Svgf,
     "asvgf": Asvgf,
     "bmfr": Bmfr,
+    "spatial": Spatial,
+    "gaussian": Gaussian,
+    "bilateral": Bilateral,
+    "joint": Joint,
+    "atrous": Atrous,
+    "guided": Guided,
     "taa": Taa,
     "display": Display,
 }
@@ -311,6 +431,7 @@ PRESETS: dict[str, dict[str, dict[str, Value]]] = {
     "bmfr": {
         # Koskela et al. 2019: preprocessing, feature fitting, postprocessing.
         "paper": {
+            "follow_motion": False,
             "round_history": True,
             "alpha": 0.2,
             "alpha_fit": 0.1,
@@ -326,6 +447,7 @@ PRESETS: dict[str, dict[str, dict[str, Value]]] = {
         },
         # The authors' OpenCL code, where it differs from the paper.
         "reference": {
+            "follow_motion": False,
             "round_history": False,
             "alpha": 0.2,
             "alpha_fit": 0.1,

@@ -7,6 +7,7 @@ pass is there is found by trying (:mod:`gl.switches`). No kernel is compiled and
 from __future__ import annotations
 
 import json
+import textwrap
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -31,15 +32,26 @@ WORDS: Final = {
     "sky": "a sky",
     "has_sky": "a sky",
     "moving": "moving objects",
+    "lamps": "lamps",
+    "specular": "metals and gloss",
+    "glossmap": "textures of roughness or metal",
+    "bumps": "normal maps",
+    "colored": "colours of vertices",
+    "cutout": "cut-outs",
+    "separable": "separable masking",
+    "punctual": "lights without a surface",
+    "environment": "an environment",
     "positions": "world positions",
 }
 """What the switches of kernels and kinds of scenes mean; one that is not here goes by its own name."""
 
 _FEW: Final = 3
-"""So many readers of an image are named; of more only the number is given."""
+_READERS_WIDTH: Final = 70
+"""So many readers of an image are named, in so many letters; of more only the number is given."""
 
 _WIDTH: Final = 118
 _INDENT: Final = 40  # where the names of textures begin, or later
+_WORDS_INDENT: Final = 60  # where the words about rays and kernels begin, at most
 
 
 @dataclass(frozen=True)
@@ -61,7 +73,8 @@ class Subject:
     def traits(self) -> FrameTraits:
         """Those that frames of the tracer will have."""
         pixel = self.scene.scene.camera.pixel_size(self.size[1])
-        return FrameTraits(moving="prev_normal" in self.tracer.images, pixel_size=pixel)
+        images = self.tracer.images
+        return FrameTraits(moving="prev_normal" in images, specular="specular" in images, pixel_size=pixel)
 
     @property
     def images(self) -> tuple[str, ...]:
@@ -85,7 +98,7 @@ class Subject:
 
 def run(config: Config, name: str, denoiser: str, animate: bool, jitter: bool) -> None:
     """Print the explanation of a scene, built in or a file. Raises UserError where there is no such scene."""
-    scene: Scene = find_scene(name, animate)
+    scene: Scene = find_scene(name, animate, config.surroundings)
     tell_notices(scene, animate)
     compiled, tracer = prepare_tracer(scene, config)
     with tracer:
@@ -116,13 +129,23 @@ def scene_section(subject: Subject) -> list[str]:
     lamps = _count(content.lamps, "triangle")
     lamps += f", {content.textured_lamps} by a texture" if content.textured_lamps else ""
     lamps += f", {content.double_sided_lamps} on both sides" if content.double_sided_lamps else ""
-    sky = f"takes {content.sky_share:.0%} of the light samples" if content.sky_share else "none"
+    share = f"takes {content.sky_share:.0%} of the light samples"
+    sky = share if content.sky_share and not content.environment_size else "none"
+    environment = "none"
+    if around := subject.scene.scene.environment:
+        assert content.environment_size is not None
+        environment = (
+            f"{around.name}, {_by(content.environment_size)} texels, {content.environment_bytes:,} bytes; {share}"
+        )
+    punctual = ", ".join(f"{count} {kind}" for kind, count in content.punctual.items()) or "none"
     flat = content.triangles - content.smooth
     rows = [
         ("triangles", f"{content.triangles:,} in {_count(content.objects, 'object')}; {motion}"),
         ("textures", textures),
         ("lamps", lamps if content.lamps else "none"),
+        ("lights", f"{punctual} without a surface" if content.punctual else "none without a surface"),
         ("sky", sky),
+        ("environment", environment),
         ("normals", f"the vertices' on {_count(content.smooth, 'triangle')}, the face's on {flat:,}"),
         ("tables", f"{content.table_bytes:,} bytes of main memory, all that the kernels read"),
     ]
@@ -140,7 +163,8 @@ def tracer_section(subject: Subject) -> list[str]:
         switches = compiled_in(kernel)
         there, missing = (_words(name for name, on in switches.items() if on is wanted) for wanted in (True, False))
         parts = [f"with {there}" if there else "", f"without {missing}" if missing else ""]
-        rows.append(("kernel", _name(kernel), "; ".join(part for part in parts if part)))
+        first, *more = textwrap.wrap("; ".join(part for part in parts if part), _WIDTH - _WORDS_INDENT)
+        rows += [("kernel", _name(kernel), first), *(("", "", line) for line in more)]
     scenes = "two scenes, that of what moves built anew every frame" if tracer.variant.moving else "one scene"
     rows.append(("Embree", tracer.rays.name, scenes))
     rule = remembered(config, subject.denoiser)
@@ -180,7 +204,11 @@ def pass_section(subject: Subject) -> list[str]:
     """The passes that run, and those that could, each with the settings that decide on it."""
     plan = subject.plan
     programs = len({node.program for node in plan.passes})
-    rows = [(node.name, _because(subject, node.name)) for node in plan.passes]
+    longest = max(len(node.name) for node in plan.passes)
+    rows: list[tuple[str, ...]] = []
+    for node in plan.passes:
+        first, *more = textwrap.wrap(_because(subject, node.name), _WIDTH - longest - 4, break_on_hyphens=False)
+        rows += [(node.name, first), *(("", line) for line in more)]
     head = f"passes of {subject.denoiser}: {len(plan.passes)}, by {programs} programs, {len(plan.culled)} culled"
     lines = [head, *_columns(rows)]
     lines += [f"  {node.name}  culled: no output needs it" for node in plan.culled]
@@ -222,7 +250,7 @@ def memory_section(subject: Subject) -> list[str]:
 
 def switch_section(subject: Subject) -> list[str]:
     """What another value of each setting would change: passes, GPU memory, upload."""
-    rows: list[tuple[str, ...]] = [("", "passes", "compiled or wired anew", "GPU bytes", "bytes uploaded per frame")]
+    rows: list[tuple[str, ...]] = [("", "passes", "compiled or wired anew", "GPU bytes", "bytes uploaded")]
     before = subject.plan.memory(subject.size)
     for effect in nearest(subject.effects):
         after = effect.plan.memory(subject.size)
@@ -270,7 +298,9 @@ def _readers(plan: Plan, image: str) -> str:
     names = [node.name for node in plan.passes if any(tex.name == PREFIX + image for tex in node.reads.values())]
     if not names:
         return "handed on as it is"
-    return f"read by {', '.join(names) if len(names) <= _FEW else f'{len(names)} passes'}"
+    listed = ", ".join(names)
+    short = len(names) <= _FEW and len(listed) <= _READERS_WIDTH
+    return f"read by {listed if short else f'{len(names)} passes'}"
 
 
 def _why_not_made(tracer: Tracer, image: str) -> str:

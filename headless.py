@@ -140,14 +140,13 @@ def reference_of(shot: Shot, packet: FramePacket, samples: int, progress: Callab
     width, height = shot.size
     camera = shot.camera(packet.index).with_jitter(packet.jitter)
     portion = max(1, PATHS_AT_ONCE // (width * height))
-    direct, indirect = np.zeros((2, height, width, 3))
+    signals = np.zeros((2 if packet.specular is None else 3, height, width, 3))
     for first in range(0, samples, portion):
         count = min(portion, samples - first)
         means = shot.tracer.reference(camera, shot.size, count, packet.time, first)
-        direct += means[0] * (count / samples)
-        indirect += means[1] * (count / samples)
+        signals += np.stack(means) * (count / samples)
         progress((first + count) / samples)
-    return modulate(packet, direct, indirect)
+    return modulate(packet, *signals)
 
 
 def _require_texture(job: RenderJob, config: Config, shot: Shot) -> None:

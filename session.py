@@ -5,20 +5,23 @@ from __future__ import annotations
 import re
 import sys
 from contextlib import AbstractContextManager
+from dataclasses import replace
 from pathlib import Path
 from typing import Protocol
 
 import assets
-from config import Config
+from config import Config, Surroundings
 from console import Progress
-from errors import UserError, did_you_mean
-from raytrace.camera import Camera
+from errors import Notices, UserError, did_you_mean
+from raytrace.camera_path import PATH_FORMATS, read_camera_path
 from raytrace.compile_events import watch_kernels
 from raytrace.compiled import CompiledScene, compile_scene
 from raytrace.integrator import Settings, Tracer
 from raytrace.sampling import HALTON, HASH
 from raytrace.scene import Scene
-from raytrace.shot import Shot, read_camera_path
+from raytrace.shot import CameraPath, Shot
+
+NOTHING_AROUND = Surroundings()
 
 BYTES_PER_PIXEL = 600
 """Main memory that a frame takes, textures included (a software renderer's are there too): measured with SVGF."""
@@ -55,14 +58,28 @@ class Terminal:
         print(text, file=sys.stderr, flush=True)
 
 
-def find_scene(name: str, animate: bool) -> Scene:
-    """A built-in scene by name, or any file by path. Raises UserError when there is neither."""
+def find_scene(name: str, animate: bool, surroundings: Surroundings = NOTHING_AROUND) -> Scene:
+    """A built-in scene by name, or any file by path, in ``surroundings`` if there are any.
+
+    Raises UserError when there is neither, and for surroundings that cannot be read.
+    """
+    scene = _scene(name, animate, surrounded=surroundings.file is not None)
+    if surroundings.file is None:
+        return scene
+    from raytrace.hdr import load_environment
+
+    notices = Notices()
+    environment = load_environment(surroundings.file, notices, surroundings.strength, surroundings.rotation)
+    return replace(scene, environment=environment, sky=None, notices=(*scene.notices, *notices.lines))
+
+
+def _scene(name: str, animate: bool, surrounded: bool) -> Scene:
     if name in assets.SCENES:
         return assets.build(name, animate)
     if Path(name).suffix or Path(name).exists():
         from raytrace.load import load_scene  # slow to import, and not needed above
 
-        return load_scene(name)
+        return load_scene(name, surrounded, animate)
     raise UserError(
         f"--scene {name}: neither a built-in scene nor a file{did_you_mean(name, assets.SCENES)}",
         f"built in are: {', '.join(assets.SCENES)}",
@@ -82,6 +99,7 @@ def prepare_tracer(
         threads=render.threads,
         tile=render.tile,
         positions=positions,
+        regularize=render.regularize,
     )
     return compiled, Tracer(compiled, settings)
 
@@ -102,27 +120,28 @@ def open_tracer(
 
 
 def open_shot(
-    name: str, config: Config, camera: str | None, animate: bool, jitter: bool = False, log: Log | None = None
+    name: str,
+    config: Config,
+    camera: str | None,
+    animate: bool,
+    jitter: bool = False,
+    log: Log | None = None,
+    positions: bool = False,
 ) -> Shot:
     """Everything between a scene's name and its frames. Progress and the loader's notices go to ``log``, or to stderr.
 
-    ``camera``: "still", "flight", the path of a camera path in JSON, or None for the flight if the scene has one.
+    ``camera``: "still", "flight", the name of one of the scene's cameras, the file of a camera path, or None for the
+    flight if the scene has one. ``positions``: frames carry world positions.
     Raises UserError for a scene or camera that cannot be had, and for a picture that memory has no room for.
     """
     log = log or Terminal()
     size = config.render.width, config.render.height
     require_memory(size)
-    path = None if camera is None else _camera_path(camera)
     with log.stage(f"{Path(name).name}: reading"):
-        scene = find_scene(name, animate)
+        scene = find_scene(name, animate, config.surroundings)
     tell_notices(scene, animate, log)
-    if path is None:
-        path = "still" if scene.flight is None else "flight"
-    if path == "flight" and scene.flight is None:
-        raise UserError(
-            f"--camera flight: {scene.name} has no flight", "use --camera still, or a camera path: --camera path.json"
-        )
-    compiled, tracer = open_tracer(scene, config, log=log)
+    path = _camera_path(scene, camera)
+    compiled, tracer = open_tracer(scene, config, positions, log)
     return Shot(compiled, tracer, size, path, animate, jitter)
 
 
@@ -131,17 +150,33 @@ def tell_notices(scene: Scene, animate: bool, log: Log | None = None) -> None:
     log = log or Terminal()
     for notice in scene.notices:
         log.notice(f"{scene.name}: {notice}")
-    if animate and not scene.has_motion:
+    if animate and not scene.animated:
         log.notice(f"{scene.name}: nothing in this scene moves")
 
 
-def _camera_path(camera: str) -> str | list[Camera]:
-    if camera in ("still", "flight"):
+def _camera_path(scene: Scene, camera: str | None) -> CameraPath:
+    """What ``--camera`` means: a word, one of the scene's own cameras, or a file. Raises UserError."""
+    if camera is None:
+        camera = "still" if scene.flight is None else "flight"
+    if camera == "still":
         return camera
-    if not Path(camera).suffix and not Path(camera).exists():
-        hint = did_you_mean(camera, ("still", "flight"))
-        raise UserError(f"--camera {camera}: neither still nor flight nor a file{hint}")
-    return read_camera_path(Path(camera))
+    if camera == "flight":
+        if scene.flight is None:
+            raise UserError(
+                f"--camera flight: {scene.name} has no flight",
+                "use --camera still, or a camera path: --camera path.toml",
+            )
+        return camera
+    for own in scene.cameras:
+        if own.name == camera:
+            return own.flight or [own.camera]
+    if Path(camera).suffix in PATH_FORMATS or Path(camera).exists():
+        return read_camera_path(Path(camera))
+    names = ("still", "flight", *(own.name for own in scene.cameras))
+    raise UserError(
+        f"--camera {camera}: no camera of {scene.name}, and no file{did_you_mean(camera, names)}",
+        f"there are: {', '.join(names)}, or a camera path ({', '.join(PATH_FORMATS)})",
+    )
 
 
 def require_memory(size: tuple[int, int]) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-from assets import cornell, interior
+from assets import cornell, far, hard, interior, metals, mirrorish, penumbra, thin
 from errors import UserError, did_you_mean
 from raytrace.scene import Scene
 
@@ -30,6 +30,12 @@ SCENES: dict[str, SceneInfo] = {
     for info in (
         SceneInfo("cornell", "the Cornell box: two blocks and one area light", cornell.build),
         SceneInfo("interior", "a living room by night: textures, lamps, a fire, a toy train", interior.build),
+        SceneInfo("metals", "a roughness ramp of copper, plastic and steel balls", metals.build),
+        SceneInfo("penumbra", "soft and hard shadows of lamps that move", penumbra.build),
+        SceneInfo("thin", "a fence, wire, grass and leaves: thinner than a pixel", thin.build),
+        SceneInfo("mirrorish", "a polished floor and a brushed wall", mirrorish.build),
+        SceneInfo("hard", "a lamp of 3 cm that shines at a wall: the rest is indirect", hard.build),
+        SceneInfo("far", "the interior, 100 km from the origin", far.build),
     )
 }
 

@@ -26,7 +26,7 @@ QUICK_SIZE = (160, 90)
 class Effort:
     """``samples``: paths per pixel of references; ``slice``: those traced between two saves; ``repeats`` of the
     methods' sequence and ``tracing_repeats`` of the tracer's; ``memory_frames``: length of the run that watches memory,
-    0 = none.
+    0 = none. ``events``: how much is spent on what happens over time.
     """
 
     samples: int
@@ -34,10 +34,24 @@ class Effort:
     repeats: int
     tracing_repeats: int
     memory_frames: int
+    events: EventEffort
 
 
-FULL = Effort(samples=1024, slice=64, repeats=4, tracing_repeats=2, memory_frames=1000)
-QUICK = Effort(samples=64, slice=8, repeats=1, tracing_repeats=1, memory_frames=0)
+@dataclass(frozen=True)
+class EventEffort:
+    """``size``: (width, height) of the pictures; ``frames``: before the event, and from it on; ``samples``: paths per
+    pixel of a reference. ``stages``: variants of a method take part as well."""
+
+    size: tuple[int, int]
+    frames: tuple[int, int]
+    samples: int
+    stages: bool
+
+
+FULL = Effort(
+    1024, 64, repeats=2, tracing_repeats=2, memory_frames=1000, events=EventEffort((160, 90), (16, 40), 2048, True)
+)
+QUICK = Effort(64, 8, repeats=1, tracing_repeats=1, memory_frames=0, events=EventEffort((64, 36), (8, 16), 128, False))
 
 
 @dataclass(frozen=True)

@@ -35,15 +35,16 @@ _PROBE_SIZE = (32, 18)
 
 @dataclass(frozen=True)
 class Reference:
-    """``sums`` (2, H, W, 3) float64: illumination (direct + indirect, divided by the albedo) summed over the paths of
-    each half; ``counts``: paths per pixel in each half."""
+    """``sums`` (2, H, W, C) float64: illumination (direct + indirect, divided by the albedo) summed over the paths of
+    each half; in a scene with specular surfaces C is 6, and the last three are specular, divided by its albedo.
+    ``counts``: paths per pixel in each half."""
 
     sums: F64
     counts: tuple[int, int]
 
     @staticmethod
-    def empty(size: tuple[int, int]) -> Reference:
-        return Reference(np.zeros((2, size[1], size[0], 3)), (0, 0))
+    def empty(size: tuple[int, int], specular: bool = False) -> Reference:
+        return Reference(np.zeros((2, size[1], size[0], 6 if specular else 3)), (0, 0))
 
     @property
     def samples(self) -> int:
@@ -51,7 +52,7 @@ class Reference:
         return sum(self.counts)
 
     def plus(self, mean: F64, samples: int) -> Reference:
-        """With ``samples`` more paths of that ``mean`` (H, W, 3), which go to the half that has fewer."""
+        """With ``samples`` more paths of that ``mean`` (H, W, C), which go to the half that has fewer."""
         half = int(self.counts[1] < self.counts[0])
         sums = self.sums.copy()
         sums[half] += mean * samples
@@ -70,7 +71,7 @@ class Reference:
         return first, second
 
     @property
-    def _share(self) -> float:
+    def share(self) -> float:
         """Standard deviation of the mean over that of the difference of the halves."""
         return float(np.sqrt(self.counts[0] * self.counts[1])) / self.samples
 
@@ -78,11 +79,13 @@ class Reference:
         """Estimated RMSE of the reference itself on the pixels of ``mask``, linear radiance."""
         first, second = self.halves(packet)
         difference = (first - second)[mask]
-        return float(np.sqrt(np.mean(difference * difference))) * self._share
+        return float(np.sqrt(np.mean(difference * difference))) * self.share
 
 
 def _modulated(illumination: F64, packet: FramePacket) -> F64:
-    return np.asarray(illumination * packet.albedo[..., :3] + packet.emission[..., :3], dtype=np.float64)
+    diffuse, specular = illumination[..., :3], illumination[..., 3:]
+    radiance = packet.modulated(diffuse, np.zeros_like(diffuse), specular if specular.size else None)
+    return np.asarray(radiance, dtype=np.float64)
 
 
 def temporal_noise(now: tuple[Reference, FramePacket], before: tuple[Reference, FramePacket], mask: Mask) -> float:
@@ -92,7 +95,7 @@ def temporal_noise(now: tuple[Reference, FramePacket], before: tuple[Reference, 
     """
     first, second = now[0].halves(now[1])
     first_before, second_before = before[0].halves(before[1])
-    return temporal_difference(first, first_before, second, second_before, mask) * now[0]._share
+    return temporal_difference(first, first_before, second, second_before, mask) * now[0].share
 
 
 class ReferenceCache:
@@ -121,7 +124,8 @@ class ReferenceCache:
         """
         start = time.perf_counter()
         paths = {index: self.path(shot, index) for index in indices}
-        found = {index: load(path, shot.size) for index, path in paths.items()}
+        specular = shot.tracer.variant.specular
+        found = {index: load(path, shot.size, specular) for index, path in paths.items()}
         missing = sum(max(0, samples - reference.samples) for reference in found.values())
         if missing == 0:
             return found, time.perf_counter() - start
@@ -139,7 +143,7 @@ class ReferenceCache:
                     means = shot.tracer.reference(
                         shot.camera(index), shot.size, count, shot.time(index), reference.samples, advance
                     )
-                    reference = reference.plus(means[0] + means[1], count)
+                    reference = reference.plus(np.concatenate([means[0] + means[1], *means[2:]], axis=-1), count)
                     save(paths[index], reference)
                     done += count
                 found[index] = reference
@@ -152,9 +156,9 @@ def save(path: Path, reference: Reference) -> None:
     replace_file(path, lambda target: np.savez(target, sums=reference.sums, counts=counts))
 
 
-def load(path: Path, size: tuple[int, int]) -> Reference:
+def load(path: Path, size: tuple[int, int], specular: bool = False) -> Reference:
     """The reference in ``path``; an empty one when there is no file, or, with a line on stderr, when it is damaged."""
-    empty = Reference.empty(size)
+    empty = Reference.empty(size, specular)
     if not path.exists():
         return empty
     try:

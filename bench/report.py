@@ -1,120 +1,19 @@
-"""The results of a run, as JSON and as tables, and the goals that stand beside them."""
+"""The results of a run as tables for a terminal."""
 
 from __future__ import annotations
 
-import dataclasses
-import json
-import math
-from collections.abc import Callable
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
-
-from bench.machine import Machine
-from bench.memory import MemoryResult
-from bench.methods import APART_TAA, BMFR_PAPER, BMFR_TAA, ONE_SIGNAL_TAA, MethodResult, QualityResult
+from bench.claims import claims
+from bench.events import EventsResult
+from bench.goals import GOALS
+from bench.methods import APART_TAA, BMFR_TAA, METHODS, ONE_SIGNAL_TAA
+from bench.oidn import INSTALL
+from bench.results import QualityResult, Report, contenders
+from bench.running import available
 from bench.tracing import TracingResult
-from config import Config
 from console import table
-from storage import replace_file
 
 DEVIATION = 0.1
 """How far the passes' sum may be from the frame."""
-
-
-@dataclass(frozen=True)
-class Report:
-    """Everything measured in one run. ``seconds``: of the whole run without ``reference_seconds``, which went into
-    references that were not on disk yet."""
-
-    machine: Machine
-    config: Config
-    quick: bool
-    quality: tuple[QualityResult, ...]
-    tracing: tuple[TracingResult, ...]
-    memory: MemoryResult | None
-    seconds: float
-    reference_seconds: float
-
-
-@dataclass(frozen=True)
-class Goal:
-    """``limit``: largest value wanted; ``find``: the value in a report, None where it was not measured."""
-
-    what: str
-    unit: str
-    limit: float
-    find: Callable[[Report], float | None]
-
-
-def _method(scene: str, name: str, value: Callable[[MethodResult], float]) -> Callable[[Report], float | None]:
-    def find(report: Report) -> float | None:
-        found = [m for q in report.quality if q.scene == scene for m in q.methods if m.name == name]
-        return value(found[0]) if found else None
-
-    return find
-
-
-def _tracing(scene: str, animate: bool, value: Callable[[TracingResult], float]) -> Callable[[Report], float | None]:
-    def find(report: Report) -> float | None:
-        found = [t for t in report.tracing if (t.scene, t.animate) == (scene, animate)]
-        return value(found[0]) if found else None
-
-    return find
-
-
-# Goals at 640x360 on two cores of a server CPU of 2.5 GHz with llvmpipe. They are printed, never enforced: on another
-# machine the times mean something else.
-GOALS = (
-    Goal("cornell: RMSE of SVGF / noisy", "", 0.06, _method("cornell", APART_TAA.name, lambda m: m.rmse_ratio)),
-    Goal(
-        "cornell: temporal error of SVGF / noisy",
-        "",
-        0.06,
-        _method("cornell", APART_TAA.name, lambda m: m.temporal_ratio),
-    ),
-    Goal("SVGF + TAA, one signal", "ms", 110.0, _method("cornell", ONE_SIGNAL_TAA.name, lambda m: m.milliseconds)),
-    Goal("SVGF + TAA, direct and indirect", "ms", 190.0, _method("cornell", APART_TAA.name, lambda m: m.milliseconds)),
-    Goal("cornell: RMSE of BMFR / noisy", "", 0.04, _method("cornell", BMFR_TAA.name, lambda m: m.rmse_ratio)),
-    Goal(
-        "cornell: temporal error of BMFR / noisy",
-        "",
-        0.04,
-        _method("cornell", BMFR_TAA.name, lambda m: m.temporal_ratio),
-    ),
-    Goal("the same as published: RMSE", "", 0.045, _method("cornell", BMFR_PAPER.name, lambda m: m.rmse_ratio)),
-    Goal(
-        "the same as published: temporal error",
-        "",
-        0.045,
-        _method("cornell", BMFR_PAPER.name, lambda m: m.temporal_ratio),
-    ),
-    Goal("BMFR + TAA", "ms", 60.0, _method("cornell", BMFR_TAA.name, lambda m: m.milliseconds)),
-    Goal("of it the fit", "ms", 20.0, _method("cornell", BMFR_TAA.name, lambda m: m.of_pass("bmfr.fit"))),
-    Goal("cornell: tracing", "ms", 60.0, _tracing("cornell", False, lambda t: t.frame.median)),
-    Goal("cornell: outside Embree", "ms", 20.0, _tracing("cornell", False, lambda t: t.outside.median)),
-    Goal("interior at rest: tracing", "ms", 190.0, _tracing("interior", False, lambda t: t.frame.median)),
-    Goal("interior at rest: outside Embree", "ms", 35.0, _tracing("interior", False, lambda t: t.outside.median)),
-    Goal("interior in motion: tracing", "ms", 230.0, _tracing("interior", True, lambda t: t.frame.median)),
-    Goal("interior in motion: outside Embree", "ms", 35.0, _tracing("interior", True, lambda t: t.outside.median)),
-    Goal("memory gained over 800 frames", "MB", 5.0, lambda report: report.memory.growth if report.memory else None),
-)
-
-
-def write_json(path: Path, report: Report) -> None:
-    """Write the whole report; what is not a finite number becomes null. Raises UserError where writing fails."""
-    goals = [{"what": g.what, "unit": g.unit, "limit": g.limit, "value": g.find(report)} for g in GOALS]
-    content = _finite(dataclasses.asdict(report) | {"goals": goals})
-    text = json.dumps(content, indent=2, allow_nan=False) + "\n"
-    replace_file(path, lambda target: target.write_text(text, encoding="utf-8"))
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def header(report: Report) -> str:
@@ -160,13 +59,76 @@ def quality_table(result: QualityResult) -> str:
             f"{result.temporal_noise / noisy.temporal:.4f}",
         )
     )
-    title = f"{result.scene}, {result.motion}, {result.size[0]}x{result.size[1]}"
-    heads = (title, "frame ms", "p95", "upload", "RMSE", "/ noisy", "temporal", "/ noisy")
+    heads = (result.title, "frame ms", "p95", "upload", "RMSE", "/ noisy", "temporal", "/ noisy")
     lines = [table(heads, rows)]
     for m in result.methods:
         if m.deviation is not None and abs(m.deviation) > DEVIATION:
             lines.append(f"{m.name}: the passes add up to {1 + m.deviation:.0%} of the frame")
     return "\n".join(lines)
+
+
+def above(value: float, floor: float | None, digits: int = 4) -> str:
+    """``value``; "< floor" where the reference's own noise is all that it can be."""
+    return f"< {floor:.{digits}f}" if floor is not None and value < floor else f"{value:.{digits}f}"
+
+
+def error_table(result: QualityResult) -> str:
+    """Every error beside the time of tracing and filtering, the fronts, and path tracing in the same time."""
+    floors = result.floors
+    rows = []
+    for c in sorted(contenders(result), key=lambda c: c.milliseconds):
+        e, equal = c.errors, c.equal
+        front = " ".join(name for name, best in (("RMSE", c.best_rmse), ("FLIP", c.best_flip)) if best)
+        rows.append(
+            (
+                c.name,
+                f"{c.milliseconds:.1f}",
+                above(e.rmse, floors.rmse if floors else None),
+                above(e.relmse, floors.relmse if floors else None),
+                f"{e.psnr:.2f}",
+                f"{e.ssim:.4f}",
+                above(e.flip, floors.flip if floors else None),
+                above(e.temporal, floors.temporal if floors else None),
+                front if c.competes else "-",
+                f"{equal.samples}" if equal else "",
+                f"{equal.errors.rmse / e.rmse:.2f}" if equal and e.rmse > 0.0 else "",
+                f"{equal.errors.flip / e.flip:.2f}" if equal and e.flip > 0.0 else "",
+            )
+        )
+    if not rows:
+        return ""
+    if floors:
+        noise = (floors.rmse, floors.relmse, floors.flip, floors.temporal)
+        rmse, relmse, flip, temporal = (f"{value:.4f}" for value in noise)
+        psnr, ssim = f"{floors.psnr:.2f}", f"{floors.ssim:.4f}"
+        rows.append(("the reference's own noise", "", rmse, relmse, psnr, ssim, flip, temporal, "", "", "", ""))
+    heads = (
+        f"{result.title}: tracing and filtering", "ms", "RMSE", "relMSE", "PSNR", "SSIM", "FLIP", "temporal",
+        "on the front", "paths in that time", "their RMSE / its", "FLIP / its",
+    )  # fmt: skip
+    return table(heads, rows)
+
+
+def events_table(result: EventsResult) -> str:
+    """Flicker, and frames until an event is over."""
+    names = list(result.noise)
+    rows = [
+        (m.name, f"{m.flicker:.4f}", *(cell for n in names for cell in (f"{m.recovery[n]}", f"{m.steady[n]:.4f}")))
+        for m in result.methods
+    ]
+    rows.append(("noise of the reference", "", *(cell for n in names for cell in ("", f"{result.noise[n]:.4f}"))))
+    heads = (
+        f"{result.scene}, {result.size[0]}x{result.size[1]}, at rest: flicker",
+        "",
+        *(cell for name in names for cell in (f"frames after {name}", "steady RMSE")),
+    )
+    return table(heads, rows)
+
+
+def claims_table(result: QualityResult) -> str:
+    """What the filters are meant to be worth, and whether they are."""
+    rows = [(f"{c.method}: {c.what}", c.value, c.limit, "holds" if c.holds else "does not") for c in claims(result)]
+    return table((f"{result.scene}, claimed", "measured", "at least", ""), rows) if rows else ""
 
 
 def passes_table(result: QualityResult) -> str:
@@ -221,7 +183,11 @@ def text(report: Report) -> str:
     """The whole report for a terminal."""
     parts = [header(report), tracing_table(report.tracing)]
     for result in report.quality:
-        parts += [quality_table(result), passes_table(result)]
+        parts += [quality_table(result), error_table(result), claims_table(result), passes_table(result)]
+    if report.events:
+        parts.append(events_table(report.events))
+    if len(available(METHODS)) < len(METHODS):
+        parts.append(f"Intel Open Image Denoise is not among them: {INSTALL}")
     if report.memory:
         m = report.memory
         parts.append(

@@ -96,6 +96,7 @@ class Executor:
         uploads: Mapping[str, moderngl.Texture],
         reset: str = "",
         profiler: Profiler | None = None,
+        again: bool = False,
     ) -> Result:
         """Run all passes of ``plan``.
 
@@ -105,6 +106,7 @@ class Executor:
                 state, so set them to nearest and not repeating.
             reset: why no history may be used in this frame (``"cut"``); empty if they may.
             profiler: measures every pass; without one nothing is measured and nothing waits.
+            again: the last frame once more, with the histories that it had then.
 
         Raises:
             GraphError: an upload is missing or of another format, a uniform's value does not fit, or ``size`` is empty.
@@ -112,7 +114,10 @@ class Executor:
         """
         if min(size) < 1:
             raise GraphError(f"the frame's size is {size[0]} x {size[1]}")
-        self._run += 1
+        if again:
+            self._histories.unswap(self._run)
+        else:
+            self._run += 1
         status = self._histories.acquire(plan.feeds.values(), size, self._run, reset)
         textures = self._place(plan, size, uploads)
         self._ctx.enable_only(moderngl.NOTHING)

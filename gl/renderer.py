@@ -48,12 +48,14 @@ class Renderer:
         reset: str = "",
         profiler: Profiler | None = None,
         split: bool = False,
+        again: bool = False,
     ) -> Result:
         """Filter ``packet`` by ``denoiser``.
 
         ``reference`` (H, W, 4) float32 radiance, for the denoiser of that name. ``keep``: textures to leave readable.
         ``reset``: why histories are void, if they are; another scene, a cut and a skipped frame are noticed here.
-        ``split``: the noisy frame is an output as well (:func:`gl.pipelines.build`).
+        ``split``: the noisy frame is an output as well (:func:`gl.pipelines.build`). ``again``: ``packet`` is the one
+        run last, and is filtered with the histories that it had then.
         """
         plan = self.plan(packet, config, denoiser, keep, split)
         reset = reset or self._discontinuity(packet)
@@ -66,7 +68,7 @@ class Renderer:
                 self._uploader.upload(packet, (tex.name for tex in plan.imports))
                 if reference is not None:
                     self._uploader.write("frame.reference", reference)
-            result = self.executor.run(plan, packet.size, self._uploader.textures, reset, profiler)
+            result = self.executor.run(plan, packet.size, self._uploader.textures, reset, profiler, again)
         # Only now: a frame that failed is one that was skipped.
         self._scene_id, self._index = packet.scene_id, packet.index
         return result

@@ -105,6 +105,7 @@ class Pair:
     write: moderngl.Texture
     last_run: int
     fed_run: int = -1
+    fed_before: int = -1
 
 
 class Histories:
@@ -160,7 +161,14 @@ class Histories:
         for history in histories:
             pair = self._pairs[history.name]
             pair.read, pair.write = pair.write, pair.read
-            pair.fed_run = run
+            pair.fed_before, pair.fed_run = pair.fed_run, run
+
+    def unswap(self, run: int) -> None:
+        """Take back the swaps of ``run``, the last one: it is to be made again."""
+        for pair in self._pairs.values():
+            if pair.fed_run == run:
+                pair.read, pair.write = pair.write, pair.read
+                pair.fed_run = pair.fed_before
 
     def release_unused(self, run: int) -> None:
         """Free what has not been used for :data:`KEEP_RUNS` runs."""

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 import pyrr
 from numpy.typing import NDArray
 
-from raytrace.frame import Basis, Vector
+from raytrace.frame import Basis, CameraStep, Vector
 
 F64 = NDArray[np.float64]
 
@@ -75,6 +76,13 @@ class Camera:
         right, up, forward = (_triple(axis) for axis in self.basis())
         return right, up, forward
 
+    def step_from(self, before: Camera) -> CameraStep:
+        """What brings a point from this camera's space to that of the camera ``before``, for a frame packet."""
+        now, then = np.array(self.basis()), np.array(before.basis())
+        turn = then @ now.T
+        shift = then @ (np.array(self.position, np.float64) - np.array(before.position, np.float64))
+        return (_triple(turn[0]), _triple(turn[1]), _triple(turn[2])), _triple(shift)
+
     def view_projection(self, aspect: float, origin: F64) -> NDArray[np.float32]:
         """(4, 4) float32 for column vectors, from world space relative to ``origin`` to clip space, without jitter.
 
@@ -88,6 +96,15 @@ class Camera:
         )
         # pyrr writes matrices for row vectors; ours are for column vectors.
         return np.ascontiguousarray((view @ projection).T, dtype=np.float32)
+
+
+@dataclass(frozen=True)
+class NamedCamera:
+    """One of a scene's cameras. ``flight``: the camera at a time in seconds, None where it stands still."""
+
+    name: str
+    camera: Camera
+    flight: Callable[[float], Camera] | None = None
 
 
 def _triple(v: F64) -> Vector:

@@ -16,16 +16,25 @@ from numba import config, njit
 Compiled = Callable[..., Any]
 
 SOURCES = (
+    "brdf",
     "casting",
     "compilation",
     "compiled",
+    "cutouts",
+    "directional_albedo",
     "embree_native",
     "embree_run",
     "frame",
     "gradients",
     "guides",
     "kernels",
+    "kernels_glossy",
+    "lights",
+    "punctual",
+    "reflectance",
+    "rgbe",
     "sampling",
+    "surface",
     "tables",
     "textures",
 )

@@ -6,6 +6,7 @@ anywhere then touches two cache lines instead of seven.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,9 +14,10 @@ from numpy.typing import NDArray
 
 from errors import UserError
 from raytrace.camera import Camera
-from raytrace.sampling import build_alias
+from raytrace.light_tables import Lights, collect_lights, no_lights
+from raytrace.punctual import punctual_rows
 from raytrace.scene import Mesh, Scene
-from raytrace.textures import MAX_LEVELS, TextureAtlas, build_atlas, sample_bilinear
+from raytrace.textures import TextureAtlas, build_atlas
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -24,28 +26,15 @@ I32 = NDArray[np.int32]
 MATERIAL, OBJECT, LIGHT, SMOOTH = 0, 1, 2, 3
 """Columns of :attr:`CompiledScene.triangle_info`."""
 
+BASE_TEXTURE, EMISSION_TEXTURE, DOUBLE_SIDED, SPECULAR, GLOSS_TEXTURE, NORMAL_TEXTURE = 0, 1, 2, 3, 4, 5
+"""Columns of :attr:`CompiledScene.material_info`."""
+
+TEXTURES = [BASE_TEXTURE, EMISSION_TEXTURE, GLOSS_TEXTURE, NORMAL_TEXTURE]
+
 CORNERS, NORMALS, FACE_NORMAL, OFFSET, RECORD = 0, 9, 18, 21, 22
 """First columns of the parts of a triangle's record, and its length."""
 
 _OFFSET_SCALE = 2.0**-18
-
-
-@dataclass(frozen=True)
-class Lights:
-    """Emissive triangles and the constant sky, chosen in proportion to their power.
-
-    ``triangles`` (L,) int32; ``threshold``, ``alias``, ``pdf`` the alias table over the L triangles, plus one last
-    entry for the sky where there is one. ``density`` (L,) float32: pdf per area of a point on the triangle.
-    ``sky`` (3,) float32.
-    """
-
-    triangles: I32
-    density: F32
-    threshold: F32
-    alias: I32
-    pdf: F32
-    sky: F32
-    has_sky: bool
 
 
 @dataclass
@@ -56,8 +45,10 @@ class CompiledScene:
     ``triangle_info`` (T, 4) int32: material, object, light index or -1, 1 if the shading normals are the vertices'.
     ``triangle_uvs`` (T, 6) float32 and ``uv_density`` (T,) float32, uv units per scene unit (both of length 1 where
     nothing is textured).
-    ``base_color``, ``emission`` (M, 3) float32; ``material_info`` (M, 3) int32: base texture, emission texture, double
-    sided. ``prev_triangles`` (moving, RECORD) float32: the moving ones one frame ago.
+    ``base_color``, ``emission`` (M, 3) float32; ``material_info`` (M, 6) int32: base texture, emission texture, double
+    sided, specular, metallic-roughness texture, normal texture. ``gloss`` (M, 3) float32: metallic, roughness, scale of
+    the normal texture. ``colors`` (T, 9) float32: the corners' linear factors of the base colour, of length 1 where no
+    mesh has any. ``prev_triangles`` (moving, RECORD) float32: the moving ones one frame ago.
     ``static_count``: number of triangles that never move. Arrays of moving triangles are rewritten for every frame: one
     tracer per compiled scene.
     """
@@ -71,6 +62,8 @@ class CompiledScene:
     base_color: F32
     emission: F32
     material_info: I32
+    gloss: F32
+    colors: F32
     textures: TextureAtlas
     lights: Lights
     static_count: int
@@ -82,11 +75,42 @@ class CompiledScene:
         return bool(self.material_info[:, :2].max() >= 0)
 
     @property
+    def has_specular(self) -> bool:
+        """Whether any triangle is metallic or glossy."""
+        return bool(self._used[:, SPECULAR].any())
+
+    @property
+    def has_cutout(self) -> bool:
+        """Whether any triangle may have a hole."""
+        materials = self.scene.materials
+        return any(materials[k].alpha_cutoff is not None for k in np.unique(self.triangle_info[:, MATERIAL]))
+
+    @property
+    def ordered_meshes(self) -> list[Mesh]:
+        """Meshes in the order of their triangles."""
+        return _ordered(self.scene)
+
+    def has(self, column: int) -> bool:
+        """Whether any triangle has the texture of that column of :attr:`material_info`."""
+        return bool(self._used[:, column].max() >= 0)
+
+    @property
+    def _used(self) -> I32:
+        return self.material_info[np.unique(self.triangle_info[:, MATERIAL])]
+
+    @property
     def has_motion(self) -> bool:
         return self.static_count < len(self.triangles)
 
+    @property
+    def moves(self) -> bool:
+        """Whether :meth:`move_to` changes anything."""
+        return self.has_motion or self.scene.animated
+
     def move_to(self, time: float, previous_time: float) -> None:
-        """Write the moving triangles' positions and normals at both times (seconds)."""
+        """Write the moving triangles' positions and normals at both times (seconds), and where lights are."""
+        if self.moves:
+            self.lights.punctual[:] = punctual_rows(self.scene.lights, self.origin, time)
         if not self.has_motion:
             return
         self.triangles[self.static_count :] = self._moving_at(time)
@@ -149,11 +173,27 @@ def _uv_density(uvs: F64, triangles: F32) -> F32:
     return density
 
 
+def _colors(meshes: Sequence[Mesh]) -> F32:
+    """The corners' colours without alpha, (T, 9) float32; (1, 9) where no mesh has any."""
+    if all(mesh.colors is None for mesh in meshes):
+        return np.ones((1, 9), np.float32)
+    parts = [
+        np.ones((len(mesh.faces), 9)) if mesh.colors is None else mesh.colors[mesh.faces][..., :3].reshape(-1, 9)
+        for mesh in meshes
+    ]
+    return np.ascontiguousarray(np.concatenate(parts), dtype=np.float32)
+
+
+def _ordered(scene: Scene) -> list[Mesh]:
+    """Meshes in the order of the triangles: those that move last."""
+    return sorted(scene.meshes, key=lambda mesh: mesh.motion is not None)
+
+
 def compile_scene(scene: Scene) -> CompiledScene:
     """Prepare ``scene`` for tracing. Raises UserError for a scene without triangles."""
     if scene.triangle_count == 0:
         raise UserError(f"{scene.name}: there is no triangle in this scene", "check that the file holds meshes")
-    meshes = [m for m in scene.meshes if m.motion is None] + [m for m in scene.meshes if m.motion is not None]
+    meshes = _ordered(scene)
     static_count = sum(len(m.faces) for m in meshes if m.motion is None)
     origin = scene.origin
     triangles = np.concatenate([_records(mesh, origin) for mesh in meshes])
@@ -164,10 +204,21 @@ def compile_scene(scene: Scene) -> CompiledScene:
 
     materials = scene.materials
     material_info = np.array(
-        [(m.base_texture, m.emission_texture if m.emits else -1, m.double_sided) for m in materials], dtype=np.int32
+        [
+            (
+                m.base_texture,
+                m.emission_texture if m.emits else -1,
+                m.double_sided,
+                m.specular,
+                m.metallic_roughness_texture if m.specular else -1,
+                m.normal_texture,
+            )
+            for m in materials
+        ],
+        dtype=np.int32,
     )
     uvs, density = np.zeros((1, 6), np.float32), np.zeros(1, np.float32)
-    if material_info[:, :2].max() >= 0:
+    if material_info[:, TEXTURES].max() >= 0:
         zero = np.zeros((1, 2), np.float32)
         uvs = np.concatenate(
             [m.uvs[m.faces].reshape(-1, 6) if m.uvs is not None else np.tile(zero, (len(m.faces), 3)) for m in meshes]
@@ -184,81 +235,14 @@ def compile_scene(scene: Scene) -> CompiledScene:
         base_color=np.array([m.base_color for m in materials], dtype=np.float32),
         emission=np.array([m.emission for m in materials], dtype=np.float32),
         material_info=material_info,
+        colors=_colors(meshes),
+        gloss=np.array([(m.metallic, m.roughness, m.normal_scale) for m in materials], dtype=np.float32),
         textures=build_atlas(scene.textures),
-        lights=_no_lights(),
+        lights=no_lights(),
         static_count=static_count,
         prev_triangles=triangles[static_count:].copy(),
         extent=float(np.linalg.norm(upper - lower)),
     )
-    compiled.lights = _collect_lights(compiled)
+    compiled.lights = collect_lights(compiled, info[:, MATERIAL])
+    info[compiled.lights.triangles, LIGHT] = np.arange(len(compiled.lights.triangles))
     return compiled
-
-
-def _no_lights() -> Lights:
-    none = np.zeros(0, np.float32)
-    return Lights(np.zeros(0, np.int32), none, none, np.zeros(0, np.int32), none, np.zeros(3, np.float32), False)
-
-
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
-_SKY_SHARE = 0.5  # of all light samples: by power alone the sky outside would starve the lamps of a closed room
-
-
-def _collect_lights(compiled: CompiledScene) -> Lights:
-    """Emissive triangles with their selection probabilities; fills the light column of ``triangle_info``."""
-    materials = compiled.triangle_info[:, MATERIAL]
-    emits = np.array([m.emits for m in compiled.scene.materials])
-    triangles = np.flatnonzero(emits[materials]).astype(np.int32)
-    corners = compiled.triangles[triangles, :9].reshape(-1, 3, 3).astype(np.float64)
-    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
-    mean = _mean_emission(compiled, triangles)
-    sides = 1.0 + compiled.material_info[materials[triangles], 2]
-    power = np.pi * areas * sides * (mean @ _LUMINANCE)
-    keep = power > 0.0  # a triangle under a black part of an emissive texture is no light
-    triangles, areas, power = triangles[keep], areas[keep], power[keep]
-    compiled.triangle_info[:, LIGHT] = -1
-    compiled.triangle_info[triangles, LIGHT] = np.arange(len(triangles))
-    sky = np.array(compiled.scene.sky or (0.0, 0.0, 0.0))
-    has_sky = compiled.scene.sky is not None and float(sky.max()) > 0.0
-    if has_sky:
-        # The power that a sphere around the scene receives, pi R^2 times the radiance times pi.
-        sky_power = np.pi**2 * (compiled.extent / 2) ** 2 * float(sky @ _LUMINANCE)
-        total = power.sum()
-        power = np.append(power, min(sky_power, total * _SKY_SHARE / (1 - _SKY_SHARE)) if total > 0 else 1.0)
-    threshold, alias, pdf = build_alias(power) if len(power) else (np.zeros(0, np.float32),) * 3
-    return Lights(
-        triangles,
-        (pdf[: len(triangles)] / np.maximum(areas, 1e-30)).astype(np.float32),
-        threshold,
-        np.asarray(alias, np.int32),
-        pdf,
-        sky.astype(np.float32),
-        has_sky,
-    )
-
-
-_PROBES = 8  # along an edge
-_CELLS = [(i, j) for i in range(_PROBES) for j in range(_PROBES - i)]
-_STRATA = [((i + 0.5) / _PROBES, (j + 0.5) / _PROBES) for i, j in _CELLS]
-_SHARES = [1.0 if i + j < _PROBES - 1 else 0.5 for i, j in _CELLS]  # the long side halves the cells that it crosses
-
-
-def _mean_emission(compiled: CompiledScene, triangles: I32) -> F64:
-    """Mean radiance over each of ``triangles``, (n, 3) float64; textured ones are probed at fixed points.
-
-    Probes read the mip level whose texels are as far apart as they are: a small lamp in a large texture must not fall
-    between them, for a triangle whose mean is 0 is taken for no light at all.
-    """
-    materials = compiled.triangle_info[triangles, MATERIAL]
-    radiance: F64 = compiled.emission[materials].astype(np.float64)
-    textures = compiled.material_info[materials, 1] if len(materials) else np.zeros(0, np.int32)
-    for index in np.unique(textures[textures >= 0]):
-        chosen = np.flatnonzero(textures == index)
-        uvs = compiled.triangle_uvs[triangles[chosen]].reshape(-1, 3, 2).astype(np.float64)
-        texels_apart = (np.ptp(uvs, axis=1) * compiled.textures.levels[index, 0, 1:]).max(axis=1) / _PROBES
-        levels = np.clip(np.ceil(np.log2(np.maximum(texels_apart, 1.0))), 0, MAX_LEVELS - 1).astype(np.int64)
-        for level in np.unique(levels):
-            a, b, c = uvs[levels == level].transpose(1, 0, 2)
-            probes = [(1 - s - t) * a + s * b + t * c for s, t in _STRATA]
-            colors = [sample_bilinear(compiled.textures, int(index), probe, int(level)) for probe in probes]
-            radiance[chosen[levels == level]] *= np.average(colors, axis=0, weights=_SHARES)
-    return radiance

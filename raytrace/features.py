@@ -12,9 +12,10 @@ from typing import Any
 
 from raytrace.compiled import LIGHT, MATERIAL, SMOOTH, CompiledScene
 from raytrace.guides import Outputs
+from raytrace.punctual import KINDS
 from raytrace.tables import Variant
 
-ILLUMINATION = ("direct", "indirect")
+ILLUMINATION = ("direct", "indirect", "specular")
 """The images of a frame with noise; all others come from the guide kernel."""
 
 
@@ -27,9 +28,15 @@ def images_of(variant: Variant, positions: bool, gradients: bool = False) -> tup
 
     ``positions``: the surface points are asked for as well. ``gradients``: temporal gradients are.
     """
-    needed = {"prev_normal": variant.moving, "position": positions, "prev_position": positions}
-    guides = (name for name in Outputs._fields if needed.get(name, True))
-    return (*ILLUMINATION, *guides, *((GRADIENT,) if gradients else ()))
+    needed = {
+        "prev_normal": variant.moving,
+        "position": positions,
+        "prev_position": positions,
+        "specular": variant.specular,
+        "specular_albedo": variant.specular,
+    }
+    images = (name for name in (*ILLUMINATION, *Outputs._fields) if needed.get(name, True))
+    return (*images, *((GRADIENT,) if gradients else ()))
 
 
 def rays_of(scene: CompiledScene) -> dict[str, int]:
@@ -47,7 +54,7 @@ def compiled_in(kernel: Callable[..., Any]) -> dict[str, bool]:
     Numba takes the variables that a function closes over as constants, and drops the branches not taken.
     """
     closed_over = inspect.getclosurevars(getattr(kernel, "py_func", kernel)).nonlocals
-    return {name: value for name, value in closed_over.items() if isinstance(value, bool)}
+    return {name: value for name, value in sorted(closed_over.items()) if isinstance(value, bool)}
 
 
 @dataclass(frozen=True)
@@ -56,8 +63,10 @@ class Content:
 
     ``moving``, ``smooth``: triangles that move, and those with the vertices' normals. ``textures``: images that a
     material refers to; ``texel_bytes``: with all their levels. ``lamps``: triangles that emit, of which
-    ``textured_lamps`` by a texture and ``double_sided_lamps`` on both sides. ``sky_share``: of the light samples, 0
-    without a sky. ``table_bytes``: all arrays that the kernels read, texels included. Bytes are of main memory.
+    ``textured_lamps`` by a texture and ``double_sided_lamps`` on both sides. ``punctual``: lights without a surface, by
+    kind. ``environment_size``: width and height of the environment's picture, or None; ``environment_bytes``: with what
+    is needed to sample it. ``sky_share``: what the sky or the environment gets of the light samples. ``table_bytes``:
+    all arrays that the kernels read, texels included. Bytes are of main memory.
     """
 
     triangles: int
@@ -70,6 +79,9 @@ class Content:
     lamps: int
     textured_lamps: int
     double_sided_lamps: int
+    punctual: dict[str, int]
+    environment_size: tuple[int, int] | None
+    environment_bytes: int
     sky_share: float
     table_bytes: int
 
@@ -78,7 +90,10 @@ def content_of(scene: CompiledScene, tables: tuple[Any, ...]) -> Content:
     """Count what is in ``scene``; ``tables``: its arrays as the kernels take them."""
     used = scene.material_info[:, :2]
     lamps = scene.material_info[scene.triangle_info[scene.triangle_info[:, LIGHT] >= 0, MATERIAL]]
-    lights = scene.lights
+    lights, around = scene.lights, scene.scene.environment
+    kinds = [light.kind for light in scene.scene.lights]
+    tables_around = lights.environment
+    bytes_around = sum(part.nbytes for part in (tables_around.texels, tables_around.rows, tables_around.columns))
     return Content(
         triangles=len(scene.triangles),
         moving=len(scene.triangles) - scene.static_count,
@@ -90,6 +105,9 @@ def content_of(scene: CompiledScene, tables: tuple[Any, ...]) -> Content:
         lamps=len(lights.triangles),
         textured_lamps=int((lamps[:, 1] >= 0).sum()),
         double_sided_lamps=int((lamps[:, 2] != 0).sum()),
-        sky_share=float(lights.pdf[-1]) if lights.has_sky else 0.0,
+        punctual={kind: kinds.count(kind) for kind in KINDS if kind in kinds},
+        environment_size=None if around is None else (around.pixels.shape[1], around.pixels.shape[0]),
+        environment_bytes=0 if around is None else bytes_around,
+        sky_share=float(lights.pdf[-1]) if lights.has_sky or around is not None else 0.0,
         table_bytes=sum(array.nbytes for array in tables if hasattr(array, "nbytes")),
     )

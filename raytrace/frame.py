@@ -9,12 +9,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 F32 = NDArray[np.float32]
+Image = NDArray[np.floating]
 
 Vector = tuple[float, float, float]
 Basis = tuple[Vector, Vector, Vector]
 
 STANDARD_BASIS: Basis = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, -1.0))
 """Right, up and forward of a camera that looks along -z."""
+
+CameraStep = tuple[Basis, Vector]
+"""Rows of a rotation, and a shift, scene units, that together bring a point from a frame's camera space (right, up and
+forward of the camera) to that of the frame before."""
+
+STILL: CameraStep = (((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), (0.0, 0.0, 0.0))
+"""That of a camera that stands still."""
 
 MISS = -1.0
 """Object id of a pixel whose camera ray leaves the scene."""
@@ -34,7 +42,10 @@ class FramePacket:
     except in a frame with temporal gradients: 0 where the sample was carried over from the last frame, 2 where it may
     be carried into the next one.
     Direct holds the light sample of the first hit and light sources hit by the bounce ray, combined by multiple
-    importance sampling; indirect is what arrives over one bounce. 0 where the camera ray misses.
+    importance sampling; indirect is what arrives over one bounce. 0 where the camera ray misses. Both are what the
+    diffuse part of the surface reflects.
+    ``specular`` (H, W, 4): rgb = what its specular part reflects of both, divided by ``specular_albedo``; 0 where there
+    is none. None in a scene without metals and gloss, as is ``specular_albedo``.
 
     ``temporal_gradient`` (ceil(H / 3), ceil(W / 3), 4): by how much the light has changed since the last frame, one
     surface point for each 3x3 pixels: luminance of the direct light now minus then, and the larger of the two; the same
@@ -43,7 +54,10 @@ class FramePacket:
 
     Without noise (guides):
 
-    ``albedo`` (H, W, 4): rgb in [0, 1], the divisor above; a = 1 on surfaces, 0 on misses.
+    ``albedo`` (H, W, 4): rgb in [0, 1], the divisor above; a = 1 on surfaces, 0 on misses. Of a glossy surface what
+    its diffuse part reflects from everywhere towards the camera, 0 for a metal.
+    ``specular_albedo`` (H, W, 4): rgb = what the specular part reflects from everywhere, in [0, 1], 0 on diffuse
+    surfaces; a = roughness in [0, 1], there 1. All 0 on a miss.
     ``emission`` (H, W, 4): rgb = radiance emitted by the surface seen, or of the sky on a miss; a unused (1).
     ``surface`` (H, W, 4): xyz = unit shading normal, world space, of the side that faces the camera; w = depth along
     the camera's forward axis, > 0, scene units. All 0 on a miss.
@@ -60,6 +74,7 @@ class FramePacket:
     ``basis``: the camera's right, up and forward unit vectors, world space. The ray of pixel (x, y) goes along
     forward + pixel_size ((x + 1/2 + jitter_x - width / 2) right + (y + 1/2 + jitter_y - height / 2) up), and meets the
     surface, relative to the camera, at depth times that.
+    ``camera_step``: how the camera has moved; None: not known.
     ``timings``: seconds of wall time by stage name, of the tracer's own clock.
     """
 
@@ -76,12 +91,15 @@ class FramePacket:
     position: F32 | None = None
     prev_position: F32 | None = None
     temporal_gradient: F32 | None = None
+    specular: F32 | None = None
+    specular_albedo: F32 | None = None
     scene: str = ""
     scene_id: int = 0
     cut: bool = False
     pixel_size: float = 0.0
     basis: Basis = STANDARD_BASIS
     jitter: tuple[float, float] = (0.0, 0.0)
+    camera_step: CameraStep | None = None
     timings: dict[str, float] = field(default_factory=dict)
 
     @property
@@ -90,5 +108,12 @@ class FramePacket:
         return self.direct.shape[1], self.direct.shape[0]
 
     def radiance(self) -> F32:
-        """The noisy picture: (direct + indirect) x albedo + emission, (H, W, 3) linear radiance."""
-        return (self.direct[..., :3] + self.indirect[..., :3]) * self.albedo[..., :3] + self.emission[..., :3]
+        """The noisy picture, (H, W, 3) linear radiance."""
+        return self.modulated(self.direct, self.indirect, self.specular)
+
+    def modulated(self, direct: Image, indirect: Image, specular: Image | None = None) -> Image:
+        """(direct + indirect) x albedo + specular x specular albedo + emission, (H, W, 3) linear radiance."""
+        diffuse = (direct[..., :3] + indirect[..., :3]) * self.albedo[..., :3]
+        if specular is not None and self.specular_albedo is not None:
+            diffuse = diffuse + specular[..., :3] * self.specular_albedo[..., :3]
+        return diffuse + self.emission[..., :3]

@@ -242,6 +242,8 @@ class GltfFile:
         size = COMPONENTS[kind] * COMPONENT_BYTES[component]
         view = self.entry("bufferViews", entry["bufferView"], where)
         stride = self.whole(view, "byteStride", size, where) or size
+        if "count" not in entry:
+            raise self.error(f"{where} does not say how many elements it has")
         count, start = self.whole(entry, "count", 0, where), self.whole(entry, "byteOffset", 0, where)
         if stride < size:
             raise self.error(f"{user} has a stride of {stride} bytes for elements of {size}")

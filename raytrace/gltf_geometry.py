@@ -23,7 +23,7 @@ from raytrace.parts import F64, Part
 
 TRIANGLES, TRIANGLE_STRIP = 4, 5
 
-_NORMALS, _UVS = "_NORMAL", "_UV"  # trimesh keeps attributes with a leading underscore as they are
+_NORMALS, _UVS, _COLORS = "_NORMAL", "_UV", "_COLOR"  # trimesh keeps attributes with a leading underscore as they are
 
 
 @dataclass(frozen=True)
@@ -119,6 +119,9 @@ def _add_primitive(document: _Document, item: Wanted) -> bool:
     kinds = {"POSITION": ("POSITION", "VEC3"), "NORMAL": (_NORMALS, "VEC3")}
     if item.uv_set is not None:
         kinds[f"TEXCOORD_{item.uv_set}"] = (_UVS, "VEC2")
+    if "COLOR_0" in attributes:
+        kind = file.entry("accessors", attributes["COLOR_0"], f"COLOR_0 of {where}").get("type")
+        kinds["COLOR_0"] = (_COLORS, "VEC3" if kind == "VEC3" else "VEC4")
     if "KHR_draco_mesh_compression" in file.table(item.primitive, "extensions", where):
         raise file.compression_error("KHR_draco_mesh_compression")
     numbers: dict[str, int] = {}
@@ -162,7 +165,15 @@ def _part(file: GltfFile, item: Wanted, loaded: Mapping[str, Any]) -> Part:
         materials=np.zeros(len(faces), dtype=np.int64),
         normals=floats(extra[_NORMALS], "NORMAL") if _NORMALS in extra else None,
         uvs=floats(extra[_UVS], f"TEXCOORD_{item.uv_set}") if _UVS in extra else None,
+        colors=_with_alpha(floats(extra[_COLORS], "COLOR_0")) if _COLORS in extra else None,
     )
+
+
+def _with_alpha(colors: F64) -> F64:
+    """(V, 4) in [0, 1] from (V, 3) or (V, 4) linear colours; what is no number is white."""
+    whole = np.ones((len(colors), 4))
+    whole[:, : colors.shape[1]] = colors
+    return np.clip(np.where(np.isfinite(whole), whole, 1.0), 0.0, 1.0)
 
 
 def _floats(array: NDArray[Any], is_normalized: bool) -> F64:

@@ -19,7 +19,7 @@ from raytrace.scene import Material, Texture
 GREY = Material("no material", double_sided=True)
 """For triangles without a material: glTF's own default, a white metal, would as a diffuse surface absorb nothing."""
 
-_DRAWN = "drawn as diffuse with their base colour"
+_BLEND_CUTOFF = 0.5  # of what should be blended: half there or not there at all
 _TEXTURE_SOURCES = ("EXT_texture_webp",)  # extensions of a texture that name an image Pillow can decode
 _LIGHT_PASSES = ("KHR_materials_transmission", "KHR_materials_diffuse_transmission")
 _TREATED = {
@@ -77,7 +77,7 @@ class _Reader:
         self.file, self.notices = file, notices
         self.table = MaterialTable()
         self.simplified: Counter[str] = Counter()
-        self._images: dict[int, int] = {}
+        self._images: dict[tuple[int, bool, bool], int] = {}
 
     def add(self, index: int | None) -> None:
         self.table.numbers[index] = len(self.table.materials)
@@ -87,27 +87,48 @@ class _Reader:
         file, entry = self.file, self.file.entry("materials", index, "a primitive")
         name = str(entry.get("name", f"material {index}"))
         where = f"material {name!r}"
-        base, base_info = self._base(entry, where)
+        base, base_info, gloss, gloss_info = self._base(entry, where)
         strength = file.extension(entry, "KHR_materials_emissive_strength", where) or {}
         factor = file.number(strength, "emissiveStrength", 1.0, where)
         emission = [max(0.0, e * factor) for e in file.numbers(entry, "emissiveFactor", (0.0, 0.0, 0.0), where)]
         emission_info = file.table(entry, "emissiveTexture", where) if max(emission) > 0.0 else {}
-        base_texture, emission_texture = self._texture(base_info, where), self._texture(emission_info, where)
-        self._choose_mapping(index, where, base_info, emission_info)
+        normal_info = file.table(entry, "normalTexture", where)
+        cutoff = self._cutoff(entry, where)
+        self._choose_mapping(index, where, base_info, gloss_info, normal_info, emission_info)
         self._count(entry, where)
         self.table.materials.append(
             Material(
                 name=name,
                 base_color=(base[0], base[1], base[2]),
-                base_texture=base_texture,
+                base_texture=self._texture(base_info, where, alpha=cutoff is not None),
                 emission=(emission[0], emission[1], emission[2]),
-                emission_texture=emission_texture,
+                emission_texture=self._texture(emission_info, where),
                 double_sided=entry.get("doubleSided") is True,
+                specular=gloss is not None,
+                metallic=0.0 if gloss is None else gloss[0],
+                roughness=1.0 if gloss is None else gloss[1],
+                metallic_roughness_texture=self._texture(gloss_info, where, linear=True),
+                normal_texture=self._texture(normal_info, where, linear=True),
+                normal_scale=file.number(normal_info, "scale", 1.0, where),
+                alpha=base[3],
+                alpha_cutoff=cutoff,
             )
         )
 
-    def _base(self, entry: Entry, where: str) -> tuple[list[float], Entry]:
-        """Base colour in [0, 1] and the texture information that belongs to it."""
+    def _cutoff(self, entry: Entry, where: str) -> float | None:
+        mode = entry.get("alphaMode", "OPAQUE")
+        if mode == "BLEND":
+            return _BLEND_CUTOFF
+        return self.file.number(entry, "alphaCutoff", 0.5, where) if mode == "MASK" else None
+
+    def _base(self, entry: Entry, where: str) -> tuple[list[float], Entry, tuple[float, float] | None, Entry]:
+        """Base colour and alpha in [0, 1] with the texture that belongs to them; metallic and roughness with theirs.
+
+        Instead of these two None for what is diffuse. That includes roughness 1 without any metal: it is what exporters
+        write for a diffuse surface, and glTF's lobe reflects a fortieth of the light there.
+        """
+        gloss: tuple[float, float] | None = None
+        gloss_info: Entry = {}
         old = self.file.extension(entry, "KHR_materials_pbrSpecularGlossiness", where)
         if old is not None:
             color = self.file.numbers(old, "diffuseFactor", (1.0, 1.0, 1.0, 1.0), where)
@@ -116,11 +137,18 @@ class _Reader:
             pbr = self.file.table(entry, "pbrMetallicRoughness", where)
             color = self.file.numbers(pbr, "baseColorFactor", (1.0, 1.0, 1.0, 1.0), where)
             info = self.file.table(pbr, "baseColorTexture", where)
+            metallic = self.file.number(pbr, "metallicFactor", 1.0, where)
+            roughness = self.file.number(pbr, "roughnessFactor", 1.0, where)
+            gloss_info = self.file.table(pbr, "metallicRoughnessTexture", where)
+            if metallic > 0.0 or roughness < 1.0 or "index" in gloss_info:
+                gloss = min(max(metallic, 0.0), 1.0), min(max(roughness, 0.0), 1.0)
+            if "KHR_materials_unlit" in self.file.table(entry, "extensions", where):
+                gloss, gloss_info = None, {}
         if not all(0.0 <= c <= 1.0 for c in color[:3]):
             self.simplified["material{s} with a base colour outside [0, 1]: clamped"] += 1
-        return [min(max(c, 0.0), 1.0) for c in color[:3]], info
+        return [min(max(c, 0.0), 1.0) for c in color], info, gloss, gloss_info
 
-    def _texture(self, info: Entry, where: str) -> int:
+    def _texture(self, info: Entry, where: str, linear: bool = False, alpha: bool = False) -> int:
         """Index of the decoded texture, -1 for none."""
         if "index" not in info:
             return -1
@@ -136,12 +164,13 @@ class _Reader:
                 "export the file with PNG or JPEG textures",
             )
         image = self.file.entry("images", source, where)
-        if source not in self._images:
-            self._images[source] = len(self.table.textures)
-            self.table.textures.append(self._decode(source, image, where))
-        return self._images[source]
+        key = source, linear, alpha
+        if key not in self._images:
+            self._images[key] = len(self.table.textures)
+            self.table.textures.append(self._decode(source, image, where, linear, alpha))
+        return self._images[key]
 
-    def _decode(self, source: int, image: Entry, where: str) -> Texture:
+    def _decode(self, source: int, image: Entry, where: str, linear: bool, alpha: bool) -> Texture:
         user = f"{where} in {self.file.path}"
         uri = str(image.get("uri", ""))
         if uri:
@@ -150,15 +179,15 @@ class _Reader:
         else:
             label = str(image.get("name", f"image {source}"))
             data = bytes(self.file.view(image.get("bufferView"), f"texture of {where}"))
-        return decode_image(data, label, user, self.notices)
+        return decode_image(data, label, user, self.notices, linear, alpha)
 
     def _choose_mapping(self, index: int, where: str, *infos: Entry) -> None:
-        """One mapping per material: the base colour's, or the emission's where that has the only texture."""
+        """One mapping per material: the base colour's, or that of the first other texture where it has none."""
         mappings = [self._mapping(info, where) for info in infos if "index" in info]
         if mappings:
             self.table.mappings[index] = mappings[0]
         if len(set(mappings)) > 1:
-            self.simplified["material{s} with an emissive texture laid out differently: base colour's layout used"] += 1
+            self.simplified["material{s} with textures laid out differently: base colour's layout used for all"] += 1
 
     def _mapping(self, info: Entry, where: str) -> UvMapping:
         file = self.file
@@ -171,21 +200,17 @@ class _Reader:
         )
 
     def _count(self, entry: Entry, where: str) -> None:
-        """Note what this material has that a diffuse surface has not."""
-        pbr = self.file.table(entry, "pbrMetallicRoughness", where)
+        """Note what this material has that is not drawn."""
         extensions = self.file.table(entry, "extensions", where)
         old = "KHR_materials_pbrSpecularGlossiness" in extensions
-        metallic = self.file.number(pbr, "metallicFactor", 1.0, where)
-        roughness = self.file.number(pbr, "roughnessFactor", 1.0, where)
         unlit = "KHR_materials_unlit" in extensions
         passes = any(name in extensions for name in _LIGHT_PASSES)
         others = sorted(name for name in extensions if name not in _TREATED)
         facts = {
-            f"metallic or glossy material{{s}}: {_DRAWN}": (old or metallic > 0.0 or roughness < 1.0) and not unlit,
-            "material{s} with a normal map: drawn without it": "normalTexture" in entry,
+            "material{s} with specular and glossiness, an old model: drawn as diffuse": old and not unlit,
             "material{s} with an occlusion map: left out, the tracer finds occlusion itself": "occlusionTexture"
             in entry,
-            "cut-out or blended material{s} (alphaMode): drawn opaque": entry.get("alphaMode", "OPAQUE") != "OPAQUE",
+            "blended material{s} (alphaMode): cut out where less than half there": entry.get("alphaMode") == "BLEND",
             "see-through material{s} (transmission): drawn opaque": passes,
             "unlit material{s}: lit like all others": unlit,
         }

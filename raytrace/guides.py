@@ -12,12 +12,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from raytrace.compilation import device, kernel
-from raytrace.compiled import FACE_NORMAL, MATERIAL, OBJECT, SMOOTH
-from raytrace.tables import Variant, interpolate, shading_normal, surface_color
+from raytrace.compilation import device, inlined, kernel
+from raytrace.compiled import FACE_NORMAL, MATERIAL, OBJECT, SMOOTH, SPECULAR
+from raytrace.lights import environment_at
+from raytrace.reflectance import albedos
+from raytrace.surface import bumped, footprint_of, seen_from, surface_gloss, view_cosine
+from raytrace.tables import Variant, base_color, interpolate, shading_normal, surface_color
 
 _ZERO, _ONE, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
-_MIN_COSINE = np.float32(0.05)  # grazing limit of the depth gradient and of texture footprints
+MIN_COSINE = np.float32(0.05)  # grazing limit of the depth gradient and of texture footprints
 
 
 @kernel
@@ -68,13 +71,33 @@ class Outputs(NamedTuple):
     prev_normal: Any
     position: Any
     prev_position: Any
+    specular_albedo: Any
+
+
+@inlined
+def _write_albedos(textured, colored, glossmap, tables, out, p, t, material, u, v, footprint, cosine):  # type: ignore[no-untyped-def]
+    """Both albedos and the roughness of a point seen at ``cosine`` in a scene with specular surfaces.
+
+    By the same arithmetic as the sample that is divided by them; a diffuse surface has roughness 1 and no specular.
+    """
+    r, g, b, metallic, roughness = surface_gloss(textured, colored, glossmap, tables, t, material, u, v, footprint)
+    sr, sg, sb = _ZERO, _ZERO, _ZERO
+    if tables.material_info[material, SPECULAR] != 0:
+        r, g, b, sr, sg, sb = albedos(tables.reflectance, r, g, b, metallic, roughness, cosine)
+    else:
+        roughness = _ONE
+    out.albedo[p, 0], out.albedo[p, 1], out.albedo[p, 2], out.albedo[p, 3] = r, g, b, _ONE
+    out.specular_albedo[p, 0], out.specular_albedo[p, 1], out.specular_albedo[p, 2] = sr, sg, sb
+    out.specular_albedo[p, 3] = roughness
 
 
 @cache
 def guide_kernel(variant: Variant, positions: bool) -> Callable[..., Any]:
     """Kernel that writes the noise-free guides of a tile; ``positions``: world positions as well."""
     textured = variant.textured
-    has_sky, moving = variant.sky, variant.moving
+    has_sky, environment = variant.sky, variant.environment
+    moving, specular, glossmap = variant.moving, variant.specular, variant.glossmap
+    bumps, colored = variant.bumps, variant.colored
 
     @kernel
     def guides(  # type: ignore[no-untyped-def]
@@ -94,12 +117,19 @@ def guide_kernel(variant: Variant, positions: bool) -> Callable[..., Any]:
                     out.emission[p, k] = _ZERO
                     if moving:
                         out.prev_normal[p, k] = _ZERO
+                    if specular:
+                        out.specular_albedo[p, k] = _ZERO
                     if positions:
                         out.position[p, k] = _ZERO
                         out.prev_position[p, k] = _ZERO
                 if has_sky:
                     for k in range(3):
                         out.emission[p, k] = tables.sky[k]
+                if environment:
+                    r, g, b, _ = environment_at(tables, directions[i, 0], directions[i, 1], directions[i, 2])
+                    out.emission[p, 0] = r
+                    out.emission[p, 1] = g
+                    out.emission[p, 2] = b
                 out.gradient[p, 0] = _ZERO
                 out.gradient[p, 1] = _ZERO
                 # The sky moves like points at infinity.
@@ -115,6 +145,13 @@ def guide_kernel(variant: Variant, positions: bool) -> Callable[..., Any]:
             x, y, z = interpolate(record, 0, u[i], v[i])
             gx, gy, gz = record[FACE_NORMAL], record[FACE_NORMAL + 1], record[FACE_NORMAL + 2]
             nx, ny, nz = shading_normal(record, tables.info[t, SMOOTH], u[i], v[i])
+            material = tables.info[t, MATERIAL]
+            if specular or bumps:  # as the sample that is divided by the albedo has it
+                ex, ey, ez = eye[0] - x, eye[1] - y, eye[2] - z
+                distance, facing = seen_from(ex, ey, ez, gx, gy, gz)
+                near = footprint_of(pixel, distance, facing)
+            if bumps:
+                nx, ny, nz = bumped(tables, record, t, material, u[i], v[i], near, nx, ny, nz)
             dx, dy, dz = directions[i, 0], directions[i, 1], directions[i, 2]
             front = gx * dx + gy * dy + gz * dz <= _ZERO
             if not front:
@@ -124,7 +161,7 @@ def guide_kernel(variant: Variant, positions: bool) -> Callable[..., Any]:
             # -depth (n·∂d)/(n·d). Near grazing n·d -> 0 is held at the cosine limit, so that a wall seen edge-on does
             # not accept every depth.
             length = math.sqrt(dx * dx + dy * dy + dz * dz)
-            facing = min(gx * dx + gy * dy + gz * dz, -_MIN_COSINE * length)
+            facing = min(gx * dx + gy * dy + gz * dz, -MIN_COSINE * length)
             scale = -depth / facing
             out.gradient[p, 0] = scale * sx * (gx * right[0] + gy * right[1] + gz * right[2])
             out.gradient[p, 1] = scale * sy * (gx * up[0] + gy * up[1] + gz * up[2])
@@ -133,13 +170,16 @@ def guide_kernel(variant: Variant, positions: bool) -> Callable[..., Any]:
             out.surface[p, 2] = nz
             out.surface[p, 3] = depth
 
-            material = tables.info[t, MATERIAL]
             footprint = pixel * depth * math.sqrt(-length / facing)
-            r, g, b = surface_color(textured, tables, 0, tables.base_color, t, material, u[i], v[i], footprint)
-            out.albedo[p, 0] = r
-            out.albedo[p, 1] = g
-            out.albedo[p, 2] = b
-            out.albedo[p, 3] = _ONE
+            if specular:
+                cosine = view_cosine(ex, ey, ez, nx, ny, nz, distance)
+                _write_albedos(textured, colored, glossmap, tables, out, p, t, material, u[i], v[i], near, cosine)
+            else:
+                r, g, b = base_color(textured, colored, tables, t, material, u[i], v[i], footprint)
+                out.albedo[p, 0] = r
+                out.albedo[p, 1] = g
+                out.albedo[p, 2] = b
+                out.albedo[p, 3] = _ONE
             if front or tables.material_info[material, 2] != 0:
                 r, g, b = surface_color(textured, tables, 1, tables.emission, t, material, u[i], v[i], footprint)
             else:
@@ -155,6 +195,8 @@ def guide_kernel(variant: Variant, positions: bool) -> Callable[..., Any]:
                     before = tables.prev_triangles[t - tables.static_count]
                     px, py, pz = interpolate(before, 0, u[i], v[i])
                     qx, qy, qz = shading_normal(before, tables.info[t, SMOOTH], u[i], v[i])
+                    if bumps:
+                        qx, qy, qz = bumped(tables, before, t, material, u[i], v[i], near, qx, qy, qz)
                     if not front:
                         qx, qy, qz = -qx, -qy, -qz
                 out.prev_normal[p, 0] = qx

@@ -12,22 +12,24 @@ import itertools
 import os
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from raytrace import kernels
+from raytrace import kernels, kernels_glossy
 from raytrace.camera import Camera
-from raytrace.compiled import OBJECT, CompiledScene
+from raytrace.compiled import CompiledScene
+from raytrace.cutouts import CutoutCaster, cutouts_of
 from raytrace.embree import open_caster
-from raytrace.features import images_of
+from raytrace.features import ILLUMINATION, images_of
 from raytrace.frame import STRATUM, FramePacket
 from raytrace.gradients import Memory, Moment, Reshading
 from raytrace.guides import Outputs, camera_rays, guide_kernel
-from raytrace.kernels import SHADOW_END
+from raytrace.lights import SHADOW_END
 from raytrace.sampling import HALTON, HASH
 from raytrace.tables import Variant, tables_of, variant_of
 
@@ -37,11 +39,15 @@ I32 = NDArray[np.int32]
 U32 = NDArray[np.uint32]
 
 REFERENCE_SEED = 0x5EED0000
-"""Added to the run's seed for references, whose frame numbers moreover start at 2^31: they draw other numbers than any
-frame does."""
+"""Added to the run's seed for references, whose frame numbers moreover start at :data:`FIRST_SAMPLE`: they draw other
+numbers than any frame does."""
+
+FIRST_SAMPLE = 1 << 31
 
 
 _identities = itertools.count(1)
+_NO_GLOSS = np.zeros((1, 3), np.float32)
+"""Stands for the specular signal that a scene has not; nothing is written there but its zeros."""
 
 
 @dataclass(frozen=True)
@@ -75,6 +81,11 @@ class View:
     matrix: F32
     jitter: F32
 
+    @property
+    def pixel(self) -> float:
+        """Width of a pixel at depth 1: ``up`` spans half the image."""
+        return float(np.linalg.norm(self.up)) * 2.0 / self.size[1]
+
     @staticmethod
     def of(camera: Camera, size: tuple[int, int], origin: F64) -> View:
         aspect = size[0] / size[1]
@@ -95,7 +106,7 @@ class _Scratch(threading.local):
     """Buffers of one thread for tiles of up to ``capacity`` paths, made on first use."""
 
     def __init__(self) -> None:
-        self.capacity = 0
+        self.capacity = self.glossy_capacity = 0
 
     def reserve(self, count: int) -> None:
         if count <= self.capacity:
@@ -106,12 +117,23 @@ class _Scratch(threading.local):
         self.light = np.empty((count, 3), np.float32)
         self.index, self.bounce_index = np.empty((2, count), np.int32)
         self.bounce_pdf, self.limit = np.empty((2, count), np.float32)
+        self.glossy_capacity = 0
+
+    def reserve_glossy(self, count: int) -> None:
+        """What paths over glossy surfaces need besides."""
+        if count <= self.glossy_capacity:
+            return
+        self.glossy_capacity = count
+        self.gloss = np.empty((count, 3), np.float32)
+        self.bounce_cosine, self.bounce_weight = np.empty(count, np.float32), np.empty((count, 4), np.float32)
 
 
 @dataclass
 class Settings:
     """How frames are traced. ``generator``: HALTON or HASH; ``threads`` 0 = one per core; ``tile`` pixels per tile;
-    ``positions``: frames carry world positions; ``backend``: see :func:`raytrace.embree.open_caster`."""
+    ``positions``: frames carry world positions; ``backend``: see :func:`raytrace.embree.open_caster`; ``regularize``:
+    narrow lobes are widened at a path's second hit, never in references; ``separable``: Smith's masking in its older,
+    separable form, as some renderers have it."""
 
     seed: int = 0
     generator: int = HALTON
@@ -119,30 +141,40 @@ class Settings:
     tile: int = 16384
     positions: bool = False
     backend: str = "auto"
+    regularize: bool = True
+    separable: bool = False
 
 
 class Tracer:
     """Traces one compiled scene. ``with Tracer(...)`` or :meth:`close` ends its threads.
 
-    ``images``: names of those its frames have. ``scene_id``: their number, which no other tracer of this process gives.
+    ``variant``: what is compiled in, if that is to be more than the scene needs. ``images``: names of those its frames
+    have. ``scene_id``: their number, which no other tracer of this process gives.
     """
 
-    def __init__(self, scene: CompiledScene, settings: Settings | None = None) -> None:
+    def __init__(self, scene: CompiledScene, settings: Settings | None = None, variant: Variant | None = None) -> None:
         self.scene = scene
         self.settings = settings or Settings()
-        self.variant: Variant = variant_of(scene)
+        self.variant: Variant = variant or variant_of(scene)
         self.images = images_of(self.variant, self.settings.positions)
         self.scene_id = next(_identities)
         self.rays = open_caster(scene.triangles, scene.static_count, self.settings.backend)
-        self.tables = tables_of(scene)
+        if self.variant.cutout:
+            self.rays = CutoutCaster(self.rays, cutouts_of(scene))
+        self.tables = tables_of(scene, self.variant)
         self._guides = guide_kernel(self.variant, self.settings.positions)
-        self._first_hit = kernels.first_hit_kernel(self.variant)
-        self._second_hit = kernels.second_hit_kernel(self.variant)
+        self._detailed = self.variant.specular or self.variant.bumps
+        if self._detailed:
+            self._first_hit = kernels_glossy.first_hit_kernel(self.variant, self.settings.separable)
+            self._second_hit = kernels_glossy.second_hit_kernel(self.variant, self.settings.separable)
+        else:
+            self._first_hit = kernels.first_hit_kernel(self.variant)
+            self._second_hit = kernels.second_hit_kernel(self.variant)
         self._scratch = _Scratch()
         self._memory = Memory()
         self.threads = self.settings.threads or len(os.sched_getaffinity(0))
         self._pool = ThreadPoolExecutor(self.threads, "trace") if self.threads > 1 else None
-        self._time: tuple[float, float] | None = None
+        self._time: tuple[float, float] | None = (0.0, 0.0) if not scene.moves else None
         self._lamps: tuple[float, float] | None = None
 
     @property
@@ -161,6 +193,13 @@ class Tracer:
             self._pool.shutdown()
         self.rays.close()
 
+    def carry_positions(self, wanted: bool) -> None:
+        """Whether frames from now on have world positions, whatever the settings said; not while one is traced."""
+        if wanted != self.settings.positions:
+            self.settings = replace(self.settings, positions=wanted)
+            self.images = images_of(self.variant, wanted)
+            self._guides = guide_kernel(self.variant, wanted)
+
     def warm_up(self) -> None:
         """Compile, or load from the disk cache, every kernel that frames of this scene need."""
         camera = self.scene.scene.camera
@@ -176,9 +215,10 @@ class Tracer:
         if self._lamps != (now, lamps):
             self.scene.dim(now, lamps)
             self._lamps = (now, lamps)
-        if self.scene.has_motion and self._time != (now, previous):
+        if self.scene.moves and self._time != (now, previous):
             self.scene.move_to(now, previous)
-            self.rays.move(self.scene.triangles, self.scene.moving_box())
+            if self.scene.has_motion:
+                self.rays.move(self.scene.triangles, self.scene.moving_box())
             self._time = (now, previous)
 
     def primary(self, view: View, pixels: I32) -> Hits:
@@ -198,23 +238,39 @@ class Tracer:
             triangle, u, v = self.rays.intersect_rows(origins, directions, view.size[0])
         else:
             triangle, u, v = self.rays.intersect(origins, directions)
-        # Index -1 of a miss picks some object; it is overwritten where that matters.
-        objects = np.where(triangle >= 0, self.scene.triangle_info[triangle, OBJECT], np.int32(-1))
+        objects = np.empty(count, np.int32)
+        kernels.objects_of(triangle, self.scene.triangle_info, objects)
         return Hits(triangle, u, v, objects), directions
 
-    def shade(self, hits: Hits, seeds: Seeds, eye: F32, direct: F32, indirect: F32) -> None:
+    def shade(
+        self,
+        hits: Hits,
+        seeds: Seeds,
+        eye: F32,
+        direct: F32,
+        indirect: F32,
+        specular: F32 | None = None,
+        *,
+        pixel: float = 0.0,
+    ) -> None:
         """One path from each of ``hits``, with the random numbers of ``seeds``, at the time last set.
 
         Writes ``direct`` and ``indirect`` (n, >= 3) float32: radiance towards ``eye`` (3,) float32 divided by the
         albedo; 0 where there is no hit. Depends on nothing but the surface point, the seeds, the time and the side of
         the surface that ``eye`` is on.
+
+        In a scene with specular surfaces also ``specular``, divided by theirs; there it depends on ``eye`` itself, and
+        on ``pixel``, the width of a pixel at distance 1, by which textures are filtered.
         """
+        if self._detailed:
+            self._shade_detailed(hits, seeds, eye, direct, indirect, specular, pixel)
+            return
         count = len(hits.triangle)
         s = self._scratch
         s.reserve(count)
         settings = self.settings
-        direct[:, :3] = 0.0
-        indirect[:, :3] = 0.0
+        kernels.clear(direct)
+        kernels.clear(indirect)
         shadows, bounces = self._first_hit(
             self.tables, hits.triangle, hits.u, hits.v, eye, seeds.pixel, seeds.frame, settings.seed,
             settings.generator, s.shadow_o, s.shadow_d, s.index, s.light, s.bounce_o, s.bounce_d, s.bounce_index,
@@ -231,13 +287,43 @@ class Tracer:
         )  # fmt: skip
         self._trace_shadows(shadows, indirect)
 
-    def _trace_shadows(self, count: int, out: F32) -> None:
+    def _shade_detailed(
+        self, hits: Hits, seeds: Seeds, eye: F32, direct: F32, indirect: F32, specular: F32 | None, pixel: float
+    ) -> None:
+        """:meth:`shade` where surfaces are metallic, glossy or bumpy; ``specular`` None if only bumpy."""
+        count = len(hits.triangle)
+        s, settings = self._scratch, self.settings
+        s.reserve(count)
+        s.reserve_glossy(count)
+        gloss = _NO_GLOSS if specular is None else specular
+        for image in (direct, indirect, gloss):
+            kernels.clear(image)
+        shadows, bounces = self._first_hit(
+            self.tables, hits.triangle, hits.u, hits.v, eye, np.float32(pixel), seeds.pixel, seeds.frame,
+            settings.seed, settings.generator, s.shadow_o, s.shadow_d, s.index, s.light, s.gloss, s.bounce_o,
+            s.bounce_d, s.bounce_index, s.bounce_pdf, s.bounce_cosine, s.bounce_weight,
+        )  # fmt: skip
+        self._trace_shadows(shadows, direct, specular)
+        if bounces == 0:
+            return
+        bounce_o, bounce_d = s.bounce_o[:bounces], s.bounce_d[:bounces]
+        triangle, u, v = self.rays.intersect(bounce_o, bounce_d)
+        shadows = self._second_hit(
+            self.tables, triangle, u, v, bounce_o, bounce_d, s.bounce_index, s.bounce_pdf, s.bounce_cosine,
+            s.bounce_weight, seeds.pixel, seeds.frame, settings.seed, settings.generator, settings.regularize, direct,
+            gloss, s.shadow_o, s.shadow_d, s.index, s.light, s.gloss,
+        )  # fmt: skip
+        self._trace_shadows(shadows, indirect, specular)
+
+    def _trace_shadows(self, count: int, out: F32, gloss: F32 | None = None) -> None:
         if count == 0:
             return
         s = self._scratch
         kernels.fill(s.limit, count, SHADOW_END)
         blocked = self.rays.occluded(s.shadow_o[:count], s.shadow_d[:count], s.limit[:count])
         kernels.add_unoccluded(blocked, s.index, s.light, out)
+        if gloss is not None:
+            kernels.add_unoccluded(blocked, s.index, s.gloss, gloss)
 
     def frame(
         self,
@@ -264,8 +350,8 @@ class Tracer:
         moment = Moment(index, now, size, (self.settings.seed, self.settings.generator))
         reshading = self._reshading(moment, previous, view, camera, cut, remember) if remember else None
         count = size[0] * size[1]
-        direct, indirect = np.empty((2, count, 4), np.float32)
-        direct[:, 3] = indirect[:, 3] = 1.0
+        signals = np.empty((3 if self.variant.specular else 2, count, 4), np.float32)
+        signals[..., 3] = 1.0
         outputs = self._outputs(count)
 
         def tile(pixels: I32) -> None:
@@ -276,13 +362,13 @@ class Tracer:
             part = slice(first, int(pixels[-1]) + 1)
             if reshading is not None:
                 reshading.replace(first, hits.triangle, hits.u, hits.v, seeds.pixel, seeds.frame)
-            self.shade(hits, seeds, view.eye, direct[part], indirect[part])
+            self.shade(hits, seeds, view.eye, *signals[:, part], pixel=view.pixel)
             if reshading is not None:
-                reshading.note(first, hits.triangle, hits.u, hits.v, direct[part], indirect[part])
+                reshading.note(first, hits.triangle, hits.u, hits.v, signals[0, part], signals[1, part])
 
         embree = self.for_each_tile(tile, size, 4 if reshading is None else 4 * STRATUM)
         timings = {"trace": time.perf_counter() - start, "embree": embree}
-        packet = self._packet(index, now, size, direct, indirect, outputs, cut, camera, timings)
+        packet = self._packet(index, now, size, signals, outputs, cut, camera, previous_camera, timings)
         if reshading is None:
             return packet
         self._memory.keep(moment, reshading.points)
@@ -314,8 +400,9 @@ class Tracer:
         now: float = 0.0,
         first_sample: int = 0,
         progress: Callable[[float], None] | None = None,
-    ) -> tuple[F64, F64]:
-        """Plain means of ``samples`` independent paths per pixel: direct and indirect, (H, W, 3) float64, demodulated.
+    ) -> tuple[F64, ...]:
+        """Plain means of ``samples`` independent paths per pixel: direct, indirect and, in a scene with specular
+        surfaces, specular, (H, W, 3) float64 each, demodulated.
 
         Uncycled hash numbers under a seed of their own; no clamp, no regularisation. Means over disjoint
         ranges of ``first_sample`` may be averaged.
@@ -323,31 +410,44 @@ class Tracer:
         self.set_time(now, now)
         view, _ = self._views(camera, camera, size)
         count = size[0] * size[1]
-        sums = np.zeros((2, count, 3))
-        normal = self.settings
-        self.settings = replace(normal, seed=(normal.seed + REFERENCE_SEED) & 0xFFFFFFFF, generator=HASH)
+        signals = 3 if self.variant.specular else 2
+        sums = np.zeros((signals, count, 3))
         done = [0]
 
         def tile(pixels: I32) -> None:
             hits, _ = self._camera_hits(view, pixels, whole_rows=True)
             part = slice(int(pixels[0]), int(pixels[-1]) + 1)
-            direct, indirect = np.empty((2, len(pixels), 3), np.float32)
+            sample_of = np.empty((signals, len(pixels), 3), np.float32)
             seeds = Seeds(pixels.astype(np.uint32), np.empty(len(pixels), np.uint32))
             for sample in range(first_sample, first_sample + samples):
-                seeds.frame[:] = 0x80000000 + sample
-                self.shade(hits, seeds, view.eye, direct, indirect)
-                sums[0, part] += direct
-                sums[1, part] += indirect
+                seeds.frame[:] = FIRST_SAMPLE + sample
+                self.shade(hits, seeds, view.eye, *sample_of, pixel=view.pixel)
+                sums[:, part] += sample_of
             done[0] += len(pixels)
             if progress is not None:
                 progress(done[0] / count)
 
-        try:
+        with self._reference_numbers():
             self.for_each_tile(tile, size)
+        return tuple((sums / samples).reshape(signals, size[1], size[0], 3))
+
+    def reference_frame(
+        self, sample: int, camera: Camera, size: tuple[int, int], now: float, lamps: float = 1.0
+    ) -> FramePacket:
+        """Sample ``sample`` of a reference, whose paths share no number with any frame's, as a frame of its own."""
+        with self._reference_numbers():
+            return self.frame(FIRST_SAMPLE + sample, camera, camera, size, now, now, lamps=lamps)
+
+    @contextmanager
+    def _reference_numbers(self) -> Iterator[None]:
+        """Meanwhile paths are drawn with uncycled hash numbers under a seed of their own, without regularisation."""
+        normal = self.settings
+        seed = (normal.seed + REFERENCE_SEED) & 0xFFFFFFFF
+        self.settings = replace(normal, seed=seed, generator=HASH, regularize=False)
+        try:
+            yield
         finally:
             self.settings = normal
-        means = (sums / samples).reshape(2, size[1], size[0], 3)
-        return means[0], means[1]
 
     def for_each_tile(self, work: Callable[[I32], None], size: tuple[int, int], rows: int = 4) -> float:
         """Run ``work`` on tiles of consecutive pixels; returns seconds inside Embree, averaged over the threads.
@@ -390,6 +490,7 @@ class Tracer:
             prev_normal=optional("prev_normal"),
             position=optional("position"),
             prev_position=optional("prev_position"),
+            specular_albedo=optional("specular_albedo"),
         )
 
     def _write_guides(
@@ -405,11 +506,11 @@ class Tracer:
         index: int,
         now: float,
         size: tuple[int, int],
-        direct: F32,
-        indirect: F32,
+        signals: F32,
         out: Outputs,
         cut: bool,
         camera: Camera,
+        previous_camera: Camera,
         timings: dict[str, float],
     ) -> FramePacket:
         width, height = size
@@ -421,8 +522,7 @@ class Tracer:
         return FramePacket(
             index=index,
             time=now,
-            direct=image(direct),
-            indirect=image(indirect),
+            **{name: image(values) for name, values in zip(ILLUMINATION, signals, strict=False)},
             **guides,
             scene=self.scene.scene.name,
             scene_id=self.scene_id,
@@ -430,5 +530,6 @@ class Tracer:
             basis=camera.axes(),
             jitter=camera.jitter,
             pixel_size=camera.pixel_size(height),
+            camera_step=camera.step_from(previous_camera),
             timings=timings,
         )

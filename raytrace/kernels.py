@@ -19,8 +19,9 @@ from typing import Any
 import numpy as np
 from numba import uint32
 
-from raytrace.compilation import inlined, kernel
-from raytrace.compiled import FACE_NORMAL, LIGHT, MATERIAL, OFFSET, SMOOTH
+from raytrace.compilation import kernel
+from raytrace.compiled import FACE_NORMAL, LIGHT, MATERIAL, OBJECT, OFFSET, SMOOTH
+from raytrace.lights import background, lamp_density, sample_light
 from raytrace.sampling import (
     PAIR_BOUNCE,
     PAIR_LIGHT,
@@ -28,72 +29,20 @@ from raytrace.sampling import (
     PAIR_SELECT,
     path_key,
     random_pair,
-    sample_alias,
     sample_cosine,
-    sample_triangle,
 )
-from raytrace.tables import Variant, interpolate, shading_normal, surface_color
+from raytrace.tables import Variant, base_color, interpolate, shading_normal, surface_color
 
 _ZERO, _ONE = np.float32(0.0), np.float32(1.0)
-_INV_PI = np.float32(1.0 / math.pi)
-_SHADOW_END = np.float32(1.0 - 1e-6)  # of the way to the light, whose own point is already offset
-_BOUNCE_CONE = np.float32(0.1)  # footprint of a bounce ray's hit per unit of distance: it stands for a wide lobe
-
-
-@inlined
-def _light_sample(textured, has_sky, tables, px, py, pz, nx, ny, nz, gx, gy, gz, offset, u, v, choice, mis):  # type: ignore[no-untyped-def]
-    """One light sample at p: shadow ray direction (its length is the segment) and radiance·cos/(π·pdf).
-
-    (gx, gy, gz): geometric normal on the same side as n. ``mis``: weight against a cosine-distributed bounce ray.
-    """
-    light = sample_alias(choice, tables.light_threshold, tables.light_alias)
-    select = tables.light_pdf[light]
-    if has_sky and light == tables.light_triangles.shape[0]:
-        x, y, z, cosine = sample_cosine(nx, ny, nz, u, v)
-        if x * gx + y * gy + z * gz <= _ZERO:
-            return _ZERO, _ZERO, _ZERO, _ZERO, _ZERO, _ZERO
-        # Both techniques draw this direction with density cos/π: radiance·cos/π / (select·cos/π) · weight.
-        scale = _ONE / (select + _ONE) if mis else _ONE / select
-        far = tables.far
-        return x * far, y * far, z * far, tables.sky[0] * scale, tables.sky[1] * scale, tables.sky[2] * scale
-    triangle = tables.light_triangles[light]
-    record = tables.triangles[triangle]
-    b, c = sample_triangle(u, v)
-    qx, qy, qz = interpolate(record, 0, b, c)
-    lx, ly, lz = record[FACE_NORMAL], record[FACE_NORMAL + 1], record[FACE_NORMAL + 2]
-    material = tables.info[triangle, MATERIAL]
-    dx, dy, dz = qx - px, qy - py, qz - pz
-    facing = -(dx * lx + dy * ly + dz * lz)
-    if facing <= _ZERO:
-        if tables.material_info[material, 2] == 0:
-            return _ZERO, _ZERO, _ZERO, _ZERO, _ZERO, _ZERO
-        lx, ly, lz, facing = -lx, -ly, -lz, -facing
-    cosine = dx * nx + dy * ny + dz * nz
-    if cosine <= _ZERO or facing <= _ZERO or dx * gx + dy * gy + dz * gz <= _ZERO:
-        return _ZERO, _ZERO, _ZERO, _ZERO, _ZERO, _ZERO
-    # With both cosines times the distance, and the density per area of this point, select / area: the density per solid
-    # angle is density·distance²/cos at the light, and that of a bounce ray cos/π. One division serves it all.
-    square = dx * dx + dy * dy + dz * dz
-    bounce = cosine * facing * _INV_PI / square
-    density = tables.light_density[light] * square
-    scale = bounce / (density + bounce) if mis else bounce / density
-    r, g, bl = surface_color(textured, tables, 1, tables.emission, triangle, material, b, c, _ZERO)
-    margin = record[OFFSET]
-    # Ends short of the light by the light's own offset, starts off the surface (added by the caller).
-    return (
-        dx + lx * margin - gx * offset,
-        dy + ly * margin - gy * offset,
-        dz + lz * margin - gz * offset,
-        r * scale,
-        g * scale,
-        bl * scale,
-    )
+_PI, _INV_PI = np.float32(math.pi), np.float32(1.0 / math.pi)
+BOUNCE_CONE = np.float32(0.1)  # footprint of a bounce ray's hit per unit of distance: it stands for a wide lobe
 
 
 @cache
 def first_hit_kernel(variant: Variant) -> Callable[..., Any]:
     """Kernel that shades first hits: returns how many shadow and bounce rays it wrote."""
-    textured, has_sky = variant.textured, variant.sky
+    textured, lamps, punctual = variant.textured, variant.lamps, variant.punctual
+    has_sky, environment = variant.sky, variant.environment
 
     @kernel
     def first_hit(  # type: ignore[no-untyped-def]
@@ -101,7 +50,7 @@ def first_hit_kernel(variant: Variant) -> Callable[..., Any]:
         shadow_o, shadow_d, shadow_index, shadow_light, bounce_o, bounce_d, bounce_index, bounce_pdf,
     ):  # fmt: skip
         shadows, bounces = 0, 0
-        lights = tables.light_pdf.shape[0] > 0
+        lights = lamps or punctual or has_sky or environment
         for i in range(triangle.shape[0]):
             t = triangle[i]
             if t < 0:
@@ -119,10 +68,15 @@ def first_hit_kernel(variant: Variant) -> Callable[..., Any]:
             if lights:
                 choice, _unused = random_pair(key, frame, PAIR_SELECT, generator)
                 a, b = random_pair(key, frame, PAIR_LIGHT, generator)
-                dx, dy, dz, r, g, bl = _light_sample(
-                    textured, has_sky, tables, x, y, z, nx, ny, nz, gx, gy, gz, offset, a, b, choice, True
-                )
-                if r + g + bl > _ZERO:
+                wx, wy, wz, dx, dy, dz, r, g, bl, density = sample_light(
+                    textured, lamps, punctual, has_sky, environment,
+                    tables, x, y, z, nx, ny, nz, gx, gy, gz, offset, a, b, choice,
+                )  # fmt: skip
+                if density != _ZERO and r + g + bl > _ZERO:
+                    # Also the density with which the bounce ray draws this direction.
+                    diffuse = (wx * nx + wy * ny + wz * nz) * _INV_PI
+                    scale = diffuse / (density + diffuse) if density > _ZERO else -diffuse / density
+                    r, g, bl = r * scale, g * scale, bl * scale
                     shadow_o[shadows, 0], shadow_o[shadows, 1], shadow_o[shadows, 2] = ox, oy, oz
                     shadow_d[shadows, 0], shadow_d[shadows, 1], shadow_d[shadows, 2] = dx, dy, dz
                     shadow_light[shadows, 0], shadow_light[shadows, 1], shadow_light[shadows, 2] = r, g, bl
@@ -145,7 +99,8 @@ def first_hit_kernel(variant: Variant) -> Callable[..., Any]:
 def second_hit_kernel(variant: Variant) -> Callable[..., Any]:
     """Kernel that shades bounce hits: adds light found by the ray to ``direct``, writes shadow rays; returns how
     many."""
-    textured, has_sky = variant.textured, variant.sky
+    textured, lamps, punctual = variant.textured, variant.lamps, variant.punctual
+    has_sky, environment, colored = variant.sky, variant.environment, variant.colored
 
     @kernel
     def second_hit(  # type: ignore[no-untyped-def]
@@ -153,15 +108,18 @@ def second_hit_kernel(variant: Variant) -> Callable[..., Any]:
         direct, shadow_o, shadow_d, shadow_index, shadow_light,
     ):  # fmt: skip
         shadows = 0
-        lights = tables.light_pdf.shape[0] > 0
+        lights = lamps or punctual or has_sky or environment
         for k in range(triangle.shape[0]):
             i = bounce_index[k]
             t = triangle[k]
             if t < 0:
-                if has_sky:
-                    weight = _ONE / (_ONE + tables.light_pdf[tables.light_pdf.shape[0] - 1])
-                    for c in range(3):
-                        direct[i, c] += tables.sky[c] * weight
+                if has_sky or environment:
+                    dx, dy, dz = bounce_d[k, 0], bounce_d[k, 1], bounce_d[k, 2]
+                    r, g, bl, density = background(has_sky, environment, tables, dx, dy, dz, bounce_pdf[k] * _PI)
+                    weight = bounce_pdf[k] / (bounce_pdf[k] + density)
+                    direct[i, 0] += r * weight
+                    direct[i, 1] += g * weight
+                    direct[i, 2] += bl * weight
                 continue
             record = tables.triangles[t]
             x, y, z = interpolate(record, 0, u[k], v[k])
@@ -176,8 +134,8 @@ def second_hit_kernel(variant: Variant) -> Callable[..., Any]:
             square = ex * ex + ey * ey + ez * ez
             material = tables.info[t, MATERIAL]
             light = tables.info[t, LIGHT]
-            if light >= 0 and (front or tables.material_info[material, 2] != 0):
-                pdf = tables.light_density[light] * square / max(facing, np.float32(1e-7))
+            if lamps and light >= 0 and (front or tables.material_info[material, 2] != 0):
+                pdf = lamp_density(tables.light_density[light], square, facing)
                 weight = bounce_pdf[k] / (bounce_pdf[k] + pdf)
                 r, g, b = surface_color(textured, tables, 1, tables.emission, t, material, u[k], v[k], _ZERO)
                 direct[i, 0] += r * weight
@@ -190,13 +148,16 @@ def second_hit_kernel(variant: Variant) -> Callable[..., Any]:
             _unused, choice = random_pair(key, frame, PAIR_SELECT, generator)
             a, b = random_pair(key, frame, PAIR_SECOND_LIGHT, generator)
             offset = record[OFFSET]
-            dx, dy, dz, r, g, bl = _light_sample(
-                textured, has_sky, tables, x, y, z, nx, ny, nz, gx, gy, gz, offset, a, b, choice, False
-            )
-            if r + g + bl <= _ZERO:
+            wx, wy, wz, dx, dy, dz, r, g, bl, density = sample_light(
+                textured, lamps, punctual, has_sky, environment,
+                tables, x, y, z, nx, ny, nz, gx, gy, gz, offset, a, b, choice,
+            )  # fmt: skip
+            if density == _ZERO or r + g + bl <= _ZERO:
                 continue
-            footprint = _BOUNCE_CONE * math.sqrt(square)
-            ar, ag, ab = surface_color(textured, tables, 0, tables.base_color, t, material, u[k], v[k], footprint)
+            scale = (wx * nx + wy * ny + wz * nz) * _INV_PI / abs(density)
+            r, g, bl = r * scale, g * scale, bl * scale
+            footprint = BOUNCE_CONE * math.sqrt(square)
+            ar, ag, ab = base_color(textured, colored, tables, t, material, u[k], v[k], footprint)
             r, g, bl = r * ar, g * ag, bl * ab
             if r + g + bl > _ZERO:
                 shadow_o[shadows, 0] = x + gx * offset
@@ -223,9 +184,23 @@ def add_unoccluded(blocked, index, light, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def clear(image):  # type: ignore[no-untyped-def]
+    """Zero in the first three channels; NumPy takes three times as long over rows of three out of four."""
+    for i in range(image.shape[0]):
+        image[i, 0] = _ZERO
+        image[i, 1] = _ZERO
+        image[i, 2] = _ZERO
+
+
+@kernel
+def objects_of(triangle, info, objects):  # type: ignore[no-untyped-def]
+    """The object of each triangle, -1 where there is none."""
+    for i in range(triangle.shape[0]):
+        t = triangle[i]
+        objects[i] = info[t, OBJECT] if t >= 0 else -1
+
+
+@kernel
 def fill(values, count, value):  # type: ignore[no-untyped-def]
     for i in range(count):
         values[i] = value
-
-
-SHADOW_END = _SHADOW_END

@@ -33,11 +33,14 @@ _FRAMING_FOV_DEGREES = 45.0
 _MARGIN = 1.02
 
 
-def load_scene(path: str | Path) -> Scene:
+def load_scene(path: str | Path, surrounded: bool = False, animate: bool = False) -> Scene:
     """Read a scene file. Units and axes stay the file's; vertices are world space, float64.
 
+    With ``animate`` what the file animates moves, otherwise it stands where it is at time 0.
+
     Without a camera in the file the whole scene is framed, up being +y; without a light it gets a constant white sky of
-    radiance 1. Both, every repair and every simplification are named in ``Scene.notices``.
+    radiance 1, unless it is ``surrounded`` by something that the caller adds. All of that, every repair and every
+    simplification are named in ``Scene.notices``.
     Raises UserError, with the file and what to do, for everything that cannot be read.
     """
     path = Path(path).expanduser()
@@ -50,18 +53,22 @@ def load_scene(path: str | Path) -> Scene:
         name=path.resolve().parent.name if path.stem == "scene" else path.stem,
         meshes=tuple(model.meshes),
         materials=tuple(model.materials),
-        camera=model.camera or Camera((0.0, 0.0, 0.0), (0.0, 0.0, -1.0)),
+        camera=model.cameras[0].camera if model.cameras else Camera((0.0, 0.0, 0.0), (0.0, 0.0, -1.0)),
         textures=tuple(model.textures),
+        lights=tuple(model.lights),
+        cameras=tuple(model.cameras),
+        flight=next((camera.flight for camera in model.cameras if camera.flight is not None), None),
     )
-    camera, sky = model.camera, None
-    if camera is None:
+    sky = None
+    if not model.cameras:
         notices.add("no camera in the file: the whole scene is framed")
-        camera = framed(scene)
-    if not has_lamp(scene):
+        scene = replace(scene, camera=framed(scene))
+    if not (surrounded or scene.lights or has_lamp(scene)):
         notices.add("no light in the file: a constant white sky is added")
         sky = (1.0, 1.0, 1.0)
     scene = with_front_lamps(scene, notices)
-    return replace(scene, camera=camera, sky=sky, notices=tuple(notices.lines))
+    scene = scene if animate else scene.standing()
+    return replace(scene, sky=sky, notices=tuple(notices.lines))
 
 
 def _reader(path: Path) -> Callable[[Path, Notices], Model]:

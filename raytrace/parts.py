@@ -8,7 +8,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from raytrace.camera import Camera
+from raytrace.camera import NamedCamera
+from raytrace.punctual import PunctualLight
 from raytrace.scene import Material, Mesh, Texture
 
 F64 = NDArray[np.float64]
@@ -20,7 +21,8 @@ class Part:
     """Triangles of one object that have the same kinds of vertex data.
 
     ``vertices`` (V, 3) float64, ``faces`` (F, 3) int64, ``materials`` (F,) int64; ``normals`` (V, 3) float64 or None
-    for flat shading, ``uvs`` (V, 2) float64 or None, origin at the lower left.
+    for flat shading, ``uvs`` (V, 2) float64 or None, origin at the lower left; ``colors`` (V, 4) float64, linear, or
+    None for white.
     """
 
     vertices: F64
@@ -28,6 +30,7 @@ class Part:
     materials: I64
     normals: F64 | None = None
     uvs: F64 | None = None
+    colors: F64 | None = None
 
 
 @dataclass
@@ -37,7 +40,8 @@ class Model:
     meshes: list[Mesh]
     materials: list[Material]
     textures: list[Texture] = field(default_factory=list)
-    camera: Camera | None = None
+    cameras: list[NamedCamera] = field(default_factory=list)
+    lights: list[PunctualLight] = field(default_factory=list)
 
 
 def face_normals(vertices: F64, faces: I64) -> F64:
@@ -86,6 +90,7 @@ def compacted(part: Part) -> Part:
         faces=faces,
         normals=None if part.normals is None else part.normals[used],
         uvs=None if part.uvs is None else part.uvs[used],
+        colors=None if part.colors is None else part.colors[used],
     )
 
 
@@ -114,11 +119,12 @@ def _with_corner_normals(part: Part) -> Part:
         faces=np.arange(len(corners), dtype=np.int64).reshape(-1, 3),
         normals=np.repeat(face_normals(part.vertices, part.faces), 3, axis=0),
         uvs=None if part.uvs is None else part.uvs[corners],
+        colors=None if part.colors is None else part.colors[corners],
     )
 
 
 def merged(name: str, parts: Sequence[Part]) -> Mesh:
-    """One object of all ``parts``. Flat and smooth ones, with and without texture coordinates, may be mixed."""
+    """One object of all ``parts``. Flat and smooth ones, with and without texture coordinates or colours, mix."""
     if any(part.normals is not None for part in parts):
         parts = [part if part.normals is not None else _with_corner_normals(part) for part in parts]
     first_vertex = np.cumsum([0] + [len(part.vertices) for part in parts])
@@ -127,6 +133,11 @@ def merged(name: str, parts: Sequence[Part]) -> Mesh:
     uvs = None
     if any(part.uvs is not None for part in parts):
         uvs = [np.zeros((len(part.vertices), 2)) if part.uvs is None else part.uvs for part in parts]
+    colors = None
+    if any(part.colors is not None for part in parts):
+        colors = [np.ones((len(part.vertices), 4)) if part.colors is None else part.colors for part in parts]
+        if all((color == 1.0).all() for color in colors):
+            colors = None
     return Mesh(
         name=name,
         vertices=np.concatenate([part.vertices for part in parts]),
@@ -134,4 +145,5 @@ def merged(name: str, parts: Sequence[Part]) -> Mesh:
         materials=np.concatenate([part.materials for part in parts]).astype(np.int32),
         normals=np.concatenate(normals).astype(np.float32) if normals else None,
         uvs=None if uvs is None else np.concatenate(uvs).astype(np.float32),
+        colors=None if colors is None else np.concatenate(colors).astype(np.float32),
     )

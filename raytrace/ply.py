@@ -15,7 +15,7 @@ from trimesh.geometry import triangulate_quads
 
 from errors import Notices, UserError
 from raytrace.images import decode_image
-from raytrace.parts import I64, Model, Part, merged
+from raytrace.parts import F64, I64, Model, Part, merged
 from raytrace.repair import Repairs, repaired
 from raytrace.resources import find_beside, read_bytes
 from raytrace.scene import Material, Texture
@@ -67,12 +67,13 @@ def _part(path: Path, data: bytes, textured: bool, notices: Notices) -> Part:
             # fix_texture would split vertices and forget their normals; texture coordinates are read below instead.
             loaded: Mapping[str, Any] = trimesh_load_ply(io.BytesIO(data), fix_texture=False, skip_materials=True)
             faces = None if loaded.get("faces") is None else _triangles(loaded["faces"])
+            vertices, normals = _vectors(loaded, "vertices"), _vectors(loaded, "vertex_normals")
     except Exception as error:  # trimesh raises whatever NumPy raised
         raise UserError(
             f"{path}: trimesh cannot read this file ({type(error).__name__}: {error})",
             "it may be cut short, or mix triangles with other polygons: export it again, with triangles only",
         ) from error
-    if faces is None or len(faces) == 0 or "vertices" not in loaded:
+    if faces is None or len(faces) == 0 or vertices is None:
         raise UserError(f"{path}: has no faces", "a cloud of points cannot be drawn: make a surface of it first")
     elements = loaded["metadata"]["_ply_raw"]
     for kind in ("vertex", "face"):
@@ -80,12 +81,17 @@ def _part(path: Path, data: bytes, textured: bool, notices: Notices) -> Part:
     if loaded.get("vertex_colors") is not None or loaded.get("face_colors") is not None:
         notices.add("vertex and face colours left out")
     part = Part(
-        vertices=np.asarray(loaded["vertices"], dtype=np.float64),
+        vertices=vertices,
         faces=faces,
         materials=np.zeros(len(faces), dtype=np.int64),
-        normals=np.asarray(loaded["vertex_normals"], dtype=np.float64) if "vertex_normals" in loaded else None,
+        normals=normals,
     )
     return _with_uvs(part, elements, notices) if textured else part
+
+
+def _vectors(loaded: Mapping[str, Any], name: str) -> F64 | None:
+    """(V, 3), None where there is none. Raises ValueError for anything else, such as lists of different length."""
+    return np.asarray(loaded[name], dtype=np.float64).reshape(-1, 3) if name in loaded else None
 
 
 def _triangles(faces: Any) -> I64:

@@ -23,9 +23,9 @@ from raytrace.compilation import device
 
 HALTON, HASH = 0, 1
 
-PAIR_LIGHT, PAIR_BOUNCE, PAIR_SECOND_LIGHT, PAIR_SELECT = 0, 1, 2, 3
-"""Pairs of dimensions of one path: point on the first light, bounce direction, point on the second hit's light, and the
-choice of the two lights."""
+PAIR_LIGHT, PAIR_BOUNCE, PAIR_SECOND_LIGHT, PAIR_SELECT, PAIR_LOBE = 0, 1, 2, 3, 4
+"""Pairs of dimensions of one path: point on the first light, bounce direction, point on the second hit's light, the
+choice of the two lights, and that of the lobe which the bounce follows."""
 
 _TINY = np.float32(2.0**-24)
 _ONE, _TWO = np.float32(1.0), np.float32(2.0)

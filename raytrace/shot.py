@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import json
-import math
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from errors import UserError
 from raytrace.camera import Camera
 from raytrace.compiled import CompiledScene
 from raytrace.frame import FramePacket
@@ -23,32 +19,8 @@ FPS = 30.0
 _JITTER = 16  # length of the Halton cycle of sub-pixel positions
 
 
-def read_camera_path(path: Path) -> list[Camera]:
-    """Cameras of a JSON file: ``{"frames": [{"camera_to_world_gl": 4x4 rows, "yfov_deg": number}, ...]}``.
-
-    The matrix has OpenGL's axes (looking along -z) and acts on column vectors.
-    Raises UserError for a missing file, broken JSON, missing keys, or numbers that are no camera.
-    """
-    try:
-        frames = json.loads(path.read_text(encoding="utf-8"))["frames"]
-        cameras = []
-        for number, frame in enumerate(frames):
-            matrix = np.array(frame["camera_to_world_gl"], dtype=np.float64)
-            yfov = float(frame["yfov_deg"])
-            usable = matrix.shape == (4, 4) and np.isfinite(matrix).all() and 0.0 < yfov < 180.0
-            if not usable or (np.linalg.norm(matrix[:3, :3], axis=0) < 1e-12).any():
-                raise UserError(f"{path}: frame {number} is no camera (4x4 finite matrix, 0 < yfov_deg < 180)")
-            cameras.append(Camera.from_matrix(matrix, math.radians(yfov)))
-    except OSError as error:
-        raise UserError(f"{path}: cannot be read ({error.strerror})") from error
-    except (ValueError, KeyError, TypeError) as error:
-        raise UserError(
-            f"{path}: is not a camera path ({type(error).__name__}: {error})",
-            'expected {"frames": [{"camera_to_world_gl": [[...], ...], "yfov_deg": 45}, ...]}',
-        ) from error
-    if not cameras:
-        raise UserError(f"{path}: there is no frame in this camera path")
-    return cameras
+CameraPath = str | list[Camera] | Callable[[float], Camera]
+"""How the camera of a shot goes: "still", "flight", one camera for each frame, or the camera at a time in seconds."""
 
 
 def jitter_of(index: int) -> tuple[float, float]:
@@ -61,7 +33,7 @@ def jitter_of(index: int) -> tuple[float, float]:
 
 
 class Shot:
-    """``camera``: "still", "flight", or a list of cameras, the last of which stays. ``animate``: objects move.
+    """``camera``: of a list of cameras the last stays. ``animate``: objects and lights move.
 
     ``remember``: as in :meth:`raytrace.integrator.Tracer.frame`; may be changed between frames.
     """
@@ -71,7 +43,7 @@ class Shot:
         scene: CompiledScene,
         tracer: Tracer,
         size: tuple[int, int],
-        camera: str | list[Camera] = "still",
+        camera: CameraPath = "still",
         animate: bool = False,
         jitter: bool = False,
         remember: str = "",
@@ -88,6 +60,8 @@ class Shot:
         """Camera of a frame, without jitter."""
         if isinstance(self._camera, list):
             return self._camera[min(max(index, 0), len(self._camera) - 1)]
+        if callable(self._camera):
+            return self._camera(index / FPS)
         return self.scene.camera_at(index / FPS, self._camera == "flight")
 
     def frame(self, index: int) -> FramePacket:
@@ -112,13 +86,16 @@ class Shot:
 
     def reference(
         self, index: int, samples: int, progress: Callable[[float], None] | None = None
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Converged direct and indirect illumination of frame ``index``, (H, W, 3) float64 each, demodulated."""
+    ) -> tuple[NDArray[np.float64], ...]:
+        """Converged illumination of frame ``index``: what :meth:`raytrace.integrator.Tracer.reference` gives."""
         return self.tracer.reference(self.camera(index), self.size, samples, self.time(index), progress=progress)
 
 
-def modulate(packet: FramePacket, direct: NDArray[np.float64], indirect: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Full radiance of demodulated illumination in the frame of ``packet``, (H, W, 4) float32."""
-    radiance = np.ones((*direct.shape[:2], 4), np.float32)
-    radiance[..., :3] = (direct + indirect) * packet.albedo[..., :3] + packet.emission[..., :3]
+def modulate(packet: FramePacket, *signals: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Full radiance of demodulated illumination in the frame of ``packet``, (H, W, 4) float32.
+
+    ``signals``: direct, indirect and, where the frame has it, specular.
+    """
+    radiance = np.ones((*signals[0].shape[:2], 4), np.float32)
+    radiance[..., :3] = packet.modulated(*signals)
     return radiance

@@ -22,6 +22,9 @@ _codes = np.arange(256) / 255.0
 SRGB_TO_LINEAR = np.where(_codes <= 0.04045, _codes / 12.92, ((_codes + 0.055) / 1.055) ** 2.4).astype(np.float32)
 """Linear value of each 8-bit sRGB code, (256,) float32. IEC 61966-2-1."""
 
+LINEAR = (np.arange(256) / 255.0).astype(np.float32)
+"""Value of each 8-bit code of a linear texture, (256,) float32."""
+
 MAX_LEVELS = 15
 
 _ONE = np.float32(1.0)
@@ -65,7 +68,7 @@ def _halve(image: NDArray[np.uint16]) -> NDArray[np.uint16]:
 
 
 def build_atlas(textures: Sequence[Texture]) -> TextureAtlas:
-    """Pack ``textures`` and their mip levels, which are averaged in linear light."""
+    """Pack ``textures`` and their mip levels, which are averaged in linear light, or as they are where linear."""
     parts: list[NDArray[np.uint8]] = []
     levels = np.zeros((max(1, len(textures)), MAX_LEVELS, 3), dtype=np.int64)
     offset = 0
@@ -80,9 +83,9 @@ def build_atlas(textures: Sequence[Texture]) -> TextureAtlas:
             if width == 1 and height == 1:
                 break
             if linear is None:
-                linear = _LINEAR_16[pixels]
+                linear = pixels.astype(np.uint16) * np.uint16(257) if texture.linear else _LINEAR_16[pixels]
             linear = _halve(linear)
-            pixels = _ENCODE_16[linear]
+            pixels = (linear >> 8).astype(np.uint8) if texture.linear else _ENCODE_16[linear]
     texels = np.concatenate(parts) if parts else np.zeros((1, 3), np.uint8)
     return TextureAtlas(texels, levels)
 

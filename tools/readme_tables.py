@@ -86,6 +86,7 @@ def _quality(result: Report) -> str:
             *(_number(m[key], 4) for key in ("rmse", "rmse_ratio", "temporal", "temporal_ratio")),
         )
         for m in result["methods"]
+        if not (m["method"] and m["method"]["stage"])  # those are for the report
     ]
     noise, temporal_noise = _number(result["noise"], 4), _number(result["temporal_noise"], 4)
     rows.append(("noise of the reference", "", noise, "", temporal_noise, ""))

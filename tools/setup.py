@@ -56,6 +56,8 @@ WAYLAND = (
     Need("libxkbcommon.so.0", ("libxkbcommon0",)),
 )
 WINDOW_TESTS = (Need("Xvfb", ("xvfb",), command=True), Need("xdotool", ("xdotool",), command=True))
+# What tries the report's page: welcome, but not every system has it as a package, and only those tests need it.
+PAGE_TESTS = (Need("chromium", ("chromium",), command=True), Need("chromedriver", ("chromium-driver",), command=True))
 
 
 class Machine:
@@ -163,6 +165,14 @@ def provide(needs: list[Need], machine: Machine) -> None:
         raise SetupError(_missing_message(missing, machine))
 
 
+def offer(needs: tuple[Need, ...], machine: Machine) -> None:
+    """Install what is missing if that is possible, or say what will be left out without it."""
+    missing = [need for need in needs if not machine.has(need)]
+    if missing and not apt_install(missing, machine):
+        names = ", ".join(need.name for need in missing)
+        print(f"set-up: without {names} some tests are skipped: {apt_command(missing, machine)}", flush=True)
+
+
 def provide_driver(machine: Machine) -> None:
     """Libraries alone draw nothing: some EGL device must initialise (Mesa's software renderer will do)."""
     if machine.egl_initialises():
@@ -231,6 +241,8 @@ def set_up(mode: str, machine: Machine) -> None:
         check_python(machine)
     provide(system_needs(mode, machine.environ), machine)
     if not current:
+        if mode == "test":
+            offer(PAGE_TESTS, machine)
         provide_driver(machine)
         make_environment(mode, machine)
 

@@ -55,6 +55,7 @@ class Filters:
         self._waiting = False
         self._prepared: tuple[object, ...] = ()
         self._shown: Graph | None = None
+        self._packet: FramePacket | None = None
         self._seen: set[Variant] = set()  # what has been drawn with, compiled in the background or not
         self.errors: list[str] = []
         self.profile: Profiler | None = None
@@ -80,8 +81,16 @@ class Filters:
         self._shown = graph
         self.profile = self._profiler if state.hud else None
         reset, state.reset = state.reset, ""
+        again, self._packet = packet is self._packet, packet
         result = self._renderer.run(
-            packet, graph.config, graph.denoiser, keep=graph.keep, split=graph.split, reset=reset, profiler=self.profile
+            packet,
+            graph.config,
+            graph.denoiser,
+            keep=graph.keep,
+            split=graph.split,
+            reset=reset,
+            profiler=self.profile,
+            again=again,
         )
         self._seen.update(variants(result.plan, packet.size))
         return result

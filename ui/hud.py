@@ -13,6 +13,7 @@ from gl.profiler import Row
 from gl.resources import VALID
 from ui import theme, widgets
 from ui.keys import BINDINGS, Action
+from ui.live_error import MAP_TOP
 from ui.state import State
 from ui.status import Status
 from ui.switches import Switch, switches
@@ -30,6 +31,7 @@ def draw(state: State, status: Status) -> None:
         _methods(state)
         _switches(state, status)
         if status.result is not None:
+            _error(state, status)
             _history(status, status.result)
             _frame(status, status.result)
         _times(status)
@@ -52,18 +54,23 @@ def _head(status: Status) -> None:
 
 def _methods(state: State) -> None:
     """A button for every method that has a key; the one shown is lit."""
+    space = 0.0  # left on the line
     for binding in BINDINGS:
         if binding.action in (Action.SHOW, Action.PREVIOUS):
             lit = binding.value == state.denoiser
+            text = f"{binding.label}  {binding.value or state.before}"
+            width = imgui.calc_text_size(text).x + 2.0 * imgui.get_style().frame_padding.x
+            if space and width > space:
+                imgui.new_line()
             if binding.action is Action.SHOW and lit:
                 imgui.push_style_color(imgui.Col_.button, theme.LIT)
-            name = binding.value or state.before
-            if imgui.button(f"{binding.label}  {name}##method"):
+            if imgui.button(f"{text}##method"):
                 state.perform(binding)
             if lit:
                 imgui.pop_style_color()
             widgets.tooltip(binding.help)
             imgui.same_line()
+            space = imgui.get_content_region_avail().x
     imgui.new_line()
     if state.denoiser not in {binding.value for binding in BINDINGS}:
         widgets.text(f"{state.denoiser}: {DENOISERS[state.denoiser]}", theme.DIM, wrap=True)
@@ -134,7 +141,7 @@ def _times(status: Status) -> None:
     filtering = sum(row.milliseconds for row in status.passes)
     longest = max(status.trace_ms, filtering, 1e-6)
     with widgets.font_size(theme.SMALL):
-        _time(Branch("tracing", status.trace_ms), longest)
+        _time(Branch(status.work, status.trace_ms), longest)
         if status.passes:
             _time(Branch("filters", filtering, tuple(branches(status.passes))), longest, opened=2)
 
@@ -151,6 +158,26 @@ def _time(branch: Branch, longest: float, opened: int = 0) -> None:
         for part in branch.parts:
             _time(part, longest, opened - 1)
         imgui.tree_pop()
+
+
+def _error(state: State, status: Status) -> None:
+    """How far the picture is from a reference of the same view; or why there is none."""
+    widgets.heading("error")
+    with widgets.font_size(theme.SMALL):
+        found = status.errors_now
+        if found is None:
+            widgets.text("tracing a reference" if status.resting else "while nothing moves", theme.DIM)
+            widgets.tooltip("Once the camera rests and the animation is stopped (Space), a reference is traced.")
+            return
+        below = found.rmse < found.noise
+        rmse = f"< {found.noise:.4f}" if below else f"{found.rmse:.4f}"
+        widgets.text(f"RMSE {rmse}", theme.DIM if below else theme.TEXT)
+        widgets.tooltip("Of linear radiance without light sources, before anti-aliasing.")
+        imgui.same_line()
+        widgets.text(f"PSNR {found.psnr:.1f} dB  FLIP {found.flip:.4f}")
+        widgets.text(f"reference: {found.samples:,} paths, its own RMSE {found.noise:.4f}", theme.DIM)
+        if state.error_map:
+            widgets.text(f"map: FLIP from 0, black, to {MAP_TOP:g} and more", theme.DIM)
 
 
 def _history(status: Status, result: Result) -> None:

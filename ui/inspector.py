@@ -90,12 +90,21 @@ def packet_readings(packet: FramePacket, pixel: Pixel) -> list[Reading]:
     at = pixel[1], pixel[0]
     albedo, surface, motion = packet.albedo[at], packet.surface[at], packet.motion[at]
     radiance = (packet.direct[at] + packet.indirect[at])[:3] * albedo[:3] + packet.emission[at][:3]
+    gloss: list[Reading] = []
+    if packet.specular is not None and packet.specular_albedo is not None:
+        reflected = packet.specular_albedo[at]
+        radiance = radiance + packet.specular[at][:3] * reflected[:3]
+        gloss = [
+            Reading("specular albedo", _numbers(reflected[:3]), _swatch(reflected)),
+            Reading("roughness", f"{reflected[3]:.3g}"),
+        ]
     rows = [Reading("noisy radiance", _numbers(radiance), _swatch(radiance))]
     if motion[3] < 0.0:
         return [*rows, Reading("object", "none: the ray left the scene")]
     return [
         *rows,
         Reading("albedo", _numbers(albedo[:3]), _swatch(albedo)),
+        *gloss,
         Reading("normal", _numbers(surface[:3])),
         Reading("depth", f"{surface[3]:.5g}"),
         Reading("motion, pixels", _numbers(motion[:2] * packet.size)),

@@ -33,7 +33,11 @@ class Action(Enum):
     """Show or hide, or switch, something that is no parameter of the picture [a switch of :class:`ui.state.State`]."""
     RESOLUTION = auto()
     """Render at the next size of the ladder [+1 or -1]."""
+    PATH = auto()
+    """Note the camera of every frame from now on, or stop and write what was noted."""
     SCREENSHOT = auto()
+    RECORD = auto()
+    """Record the frames shown, or stop recording."""
     BACK = auto()
     """Let go of the mouse or, if it is free, close the window."""
     FLY = auto()
@@ -83,6 +87,7 @@ BINDINGS: Final = (
     Binding("PERIOD", Action.STEP, "one step of the animation, then stop"),
     Binding("N", Action.NEXT_SCENE, "next of the scenes that come with the program"),
     Binding("R", Action.RESET_CAMERA, "camera back to where it began"),
+    Binding("C", Action.PATH, "record the camera's path; once more: save it as camera_NNN.toml, for --camera"),
     Binding("H", Action.RESET_HISTORY, "forget what was accumulated over time"),
     Binding("B", Action.VIEW, "look at the next texture of the graph, after the last at the picture again", "+1"),
     Binding("V", Action.VIEW, "look at the texture before", "-1"),
@@ -90,10 +95,12 @@ BINDINGS: Final = (
     Binding(
         "I", Action.FLIP, "numbers of the pixel under the mouse: channels, history, why it was rejected", "inspect"
     ),
+    Binding("M", Action.FLIP, "error map against a reference that is traced while nothing moves", "error_map"),
     Binding("EQUAL", Action.RESOLUTION, "render more pixels", "+1"),
     Binding("MINUS", Action.RESOLUTION, "render fewer pixels", "-1"),
     Binding("G", Action.FLIP, "show or hide the panel with numbers and sliders", "hud"),
     Binding("K", Action.FLIP, "show or hide this list of keys", "help"),
+    Binding("F11", Action.RECORD, "record the frames to a folder recording_NNN; once more: stop"),
     Binding("F12", Action.SCREENSHOT, "save the picture as shot_NNN.png"),
     Binding("ESCAPE", Action.BACK, "let go of the mouse; otherwise quit"),
     Binding("W", Action.FLY, "fly forward", "forward"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TextIO
 
+from bench.judge import Verdict
 from gl.plan import Plan
 
 Size = tuple[int, int]
@@ -17,6 +18,7 @@ class Log:
         self._frame = 0
         self._passes = ""
         self._errors: list[str] = []
+        self._samples = 0
 
     def frame(self, index: int, size: Size, plan: Plan, errors: list[str]) -> None:
         """Frame ``index`` of the scene is shown: size in pixels, passes, and what is wrong by now."""
@@ -30,6 +32,18 @@ class Log:
             if error not in self._errors:
                 self._write(f"error: {error}")
         self._errors = list(errors)
+
+    def error(self, verdict: Verdict | None) -> None:
+        """What is known of the error of the picture: told when it is first known, and when the reference has twice as
+        many paths as the last time."""
+        if verdict is None:
+            if self._samples:
+                self._write("no reference: something moves")
+            self._samples = 0
+        elif verdict.samples >= 2 * self._samples:
+            self._samples = verdict.samples
+            numbers = f"RMSE {verdict.rmse:.4f}, PSNR {verdict.psnr:.2f} dB, FLIP {verdict.flip:.4f}"
+            self._write(f"{numbers} against {verdict.samples} paths, whose own RMSE is {verdict.noise:.4f}")
 
     def news(self, text: str) -> None:
         """One line about the last thing done, "" for nothing."""

@@ -11,6 +11,7 @@ from imgui_bundle import imgui
 import assets
 from config import PRESETS, SECTIONS, preset_values
 from errors import UserError
+from gl.pipelines import DENOISERS
 from parameter import Param, Value, parameters
 from ui import hud, theme, widgets
 from ui.keys import BINDINGS, Action
@@ -36,6 +37,7 @@ _ICONS: Final[dict[Action, Callable[[State], str]]] = {
     Action.RESET_HISTORY: lambda _: "\uf12d",
     Action.RESET_CAMERA: lambda _: "\uf015",
     Action.SCREENSHOT: lambda _: "\uf030",
+    Action.RECORD: lambda state: "\uf04d" if state.recording else "\uf111",
 }
 
 
@@ -64,7 +66,10 @@ def _buttons(state: State) -> None:
 
 
 def _places(state: State, status: Status) -> None:
-    """Which scene, and which of its textures."""
+    """Which method, which scene, and which of its textures."""
+    method = _choose("method", state.denoiser, {name: DENOISERS[name] for name in DENOISERS if name != "reference"})
+    if method is not None:
+        state.show(method)
     scene = _choose("scene", status.scene, {name: info.description for name, info in assets.SCENES.items()})
     if scene is not None:
         state.scene = scene
@@ -96,7 +101,12 @@ def _choose(name: str, now: str, names: dict[str, str]) -> str | None:
 
 def sections(state: State) -> list[str]:
     """The sections of the configuration: the method's own, others that it reads, the rest; tracing comes last."""
-    return sorted(SECTIONS, key=lambda name: (name == "render", name != state.section, not uses(state, name)))
+
+    def order(name: str) -> tuple[bool, int]:
+        own = state.sections.index(name) if name in state.sections else len(state.sections) + (not uses(state, name))
+        return name == "render", own
+
+    return sorted(SECTIONS, key=order)
 
 
 def _section(state: State, section: str) -> None:

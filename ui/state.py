@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from config import SECTIONS, Config, apply_preset
 from errors import UserError
-from gl.pipelines import DENOISERS
+from gl.pipelines import DENOISERS, SECTIONS_OF
 from parameter import Param, Value, parameters
 from ui.keys import Action, Binding
 
@@ -47,13 +47,15 @@ class State:
     ``view``: name of the texture looked at, :data:`PICTURE` for none; ``look``: how it is shown; ``textures``: the
     names there are, as the last frame left them. ``split``: the noisy frame is shown to the left of the mouse.
     ``hud``: the panel is shown. ``help``: the list of keys is. ``inspect``: the numbers of the pixel under the mouse
-    are.
+    are. ``path``: the camera of every frame is noted. ``error_map``: what the picture differs from its reference by is
+    shown instead of it, once there is one.
 
     Wishes, which whoever fulfils them takes back: ``reset``, why the next frame may use no history; ``home``, camera
     back to where it began; ``step``, one frame more of the animation; ``scene``, a scene to open, by name or path;
     ``next_scene``; ``resolution``, rungs of the ladder to climb; ``screenshot``; ``closing``.
 
-    ``looking``: the mouse turns the camera. ``news``: one line about the last thing done, "" once it was shown.
+    ``recording``: the frames shown are recorded. ``looking``: the mouse turns the camera. ``news``: one line about the
+    last thing done, "" once it was shown.
     """
 
     config: Config
@@ -68,6 +70,8 @@ class State:
     hud: bool = False
     help: bool = False
     inspect: bool = False
+    path: bool = False
+    error_map: bool = False
     reset: str = ""
     home: bool = False
     step: bool = False
@@ -76,6 +80,7 @@ class State:
     resolution: int = 0
     screenshot: bool = False
     closing: bool = False
+    recording: bool = False
     looking: bool = False
     news: str = ""
     _counts: dict[str, Value] = field(default_factory=dict)
@@ -85,9 +90,14 @@ class State:
             self.before = "svgf" if self.denoiser == "none" else "none"
 
     @property
-    def section(self) -> str:
-        """The configuration's section that the method shown reads; "" if it has none."""
-        return {"accumulate": "svgf"}.get(self.denoiser, self.denoiser if self.denoiser in SECTIONS else "")
+    def sections(self) -> tuple[str, ...]:
+        """The configuration's sections that are the method's own, that with most of its parameters first."""
+        return SECTIONS_OF[self.denoiser]
+
+    @property
+    def judged(self) -> bool:
+        """Whether somebody looks at the error of the picture: only then a reference is traced."""
+        return (self.hud or self.error_map) and self.denoiser != "reference"
 
     @property
     def anti_aliased(self) -> bool:
@@ -109,13 +119,15 @@ class State:
     def parameter(self, name: str) -> tuple[str, Param] | None:
         """Full name, ``section.key``, and metadata of a parameter; None if the method shown has none of that name.
 
-        ``name``: ``section.key``, or a key of the section that belongs to the method shown; of several, ``a/b``, the
-        first that it has.
+        ``name``: ``section.key``, or a key of a section that is the method's own; of several, ``a/b``, the first
+        that it has.
         """
         section, _, keys = name.rpartition(".")
-        section = section or self.section
-        known = parameters(SECTIONS[section]) if section in SECTIONS else {}
-        return next(((f"{section}.{key}", known[key]) for key in keys.split("/") if key in known), None)
+        for place in (section,) if section else self.sections:
+            known = parameters(SECTIONS[place])
+            if found := next((key for key in keys.split("/") if key in known), None):
+                return f"{place}.{found}", known[found]
+        return None
 
     def value(self, name: str) -> Any:
         """Value of the parameter ``section.key``."""
@@ -175,11 +187,16 @@ class State:
             case Action.FLIP:
                 value = not getattr(self, binding.value)
                 setattr(self, binding.value, value)
-                self.news = f"{binding.value} {'on' if value else 'off'}"
+                self.news = f"{binding.value.replace('_', ' ')} {'on' if value else 'off'}"
             case Action.RESOLUTION:
                 self.resolution += int(binding.value)
+            case Action.PATH:
+                self.path = not self.path
+                self.news = "recording the camera's path" if self.path else ""
             case Action.SCREENSHOT:
                 self.screenshot = True
+            case Action.RECORD:
+                self.recording = not self.recording
             case Action.BACK:
                 self.closing = not self.looking
                 self.looking = False

@@ -9,7 +9,7 @@ from ui.state import UNFILTERED, State
 from ui.status import Status
 
 _PARAMETERS: Final = (Action.NEXT, Action.STAGE, Action.COUNT)
-_OTHERS: Final = (Action.JITTER, Action.FLIP, Action.ANIMATE, Action.VIEW, Action.RESOLUTION)
+_OTHERS: Final = (Action.JITTER, Action.FLIP, Action.ANIMATE, Action.VIEW, Action.RESOLUTION, Action.RECORD)
 _NAMELESS: Final = ("enabled", "mode")
 """Parameters that go by the name of their section."""
 
@@ -51,7 +51,7 @@ def uses(state: State, section: str) -> bool:
             return state.denoiser not in UNFILTERED
         case "firefly":
             return state.denoiser != "reference"
-    return section in (state.section, "display", "render")
+    return section in (*state.sections, "display", "render")
 
 
 def _target(binding: Binding) -> str:
@@ -79,6 +79,8 @@ def _value(binding: Binding, state: State, status: Status) -> str | bool | None:
             return state.animate
         case Action.VIEW:
             return state.view or "picture"
+        case Action.RECORD:
+            return state.recording
         case Action.RESOLUTION:
             return f"{status.size[0]}×{status.size[1]}"
     found = state.parameter(_target(binding))

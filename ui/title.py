@@ -11,9 +11,13 @@ _NEWS_FOR: Final = 3.0  # seconds
 
 
 class Pace:
-    """Frames per second and milliseconds of tracing, over the last frames shown."""
+    """Frames per second and milliseconds of tracing, over the last frames shown.
+
+    ``work``: what those milliseconds went into.
+    """
 
     def __init__(self) -> None:
+        self.work = "tracing"
         self._shown: deque[float] = deque(maxlen=32)
         self._trace_ms: deque[float] = deque(maxlen=32)
 
@@ -55,5 +59,5 @@ class Title:
             return ""
         self._changed = now
         parts = [self._news] if now < self._news_until else []
-        parts += [scene, method, f"{pace.fps:.1f} fps", f"tracing {pace.trace_ms:.0f} ms", self._renderer]
+        parts += [scene, method, f"{pace.fps:.1f} fps", f"{pace.work} {pace.trace_ms:.0f} ms", self._renderer]
         return " · ".join(parts)

@@ -25,13 +25,17 @@ from ui.camera_control import HeldKeys
 from ui.compiling_context import CompilingContext
 from ui.filters import Filters
 from ui.glfw_window import Cursor, DroppedFiles, Event, Exposed, Focus, Key, MouseButton, Wheel, Window
+from ui.keeping import Keeper
 from ui.keys import Action
+from ui.live_error import LiveError
 from ui.log import Log
 from ui.opening import Opening
 from ui.overlay import Overlay
+from ui.playback import Frames, Playback
 from ui.present import Presenter, letterbox
 from ui.resolution import Calibration, step
-from ui.screenshot import save_screenshot
+from ui.screenshot import save_path, save_screenshot
+from ui.source import NewRecorder, Source
 from ui.stage import Stage
 from ui.state import PICTURE, State
 from ui.status import Status
@@ -58,6 +62,7 @@ class Wishes:
         hud: the panel is shown from the start.
         calibrate: begin with as many pixels, the configured size at most, as this machine shows fluently.
         log: print what changes, a line each.
+        recorder: makes what the record key writes to; None: there is no recording.
     """
 
     scene: str
@@ -68,6 +73,7 @@ class Wishes:
     hud: bool
     calibrate: bool
     log: bool = False
+    recorder: NewRecorder | None = None
 
 
 def run(config: Config, wishes: Wishes) -> None:
@@ -81,20 +87,36 @@ def run(config: Config, wishes: Wishes) -> None:
         window = stack.enter_context(Window(wishes.scene, (config.render.width, config.render.height)))
         shot = open_shot(wishes.scene, config, wishes.camera, animate=True)  # Space may start what rests at first
         stage = Stage(shot, wishes.camera != "still", window.wake)
-        viewer = Viewer(window, stage, config, wishes)
-        stack.callback(viewer.release)
-        print(f"{keys.text()}\n", flush=True)
-        window.show()
-        viewer.loop()
+        _show(window, stage, config, wishes, stack)
+
+
+def play(frames: Frames, first: int, end: int, config: Config, wishes: Wishes) -> None:
+    """Open the window on recorded frames, ``first`` up to ``end``, and return when it is closed.
+
+    Raises:
+        UserError: no window can be opened, or a frame cannot be read.
+    """
+    factor = max(1, config.render.width // frames.size[0])
+    with ExitStack() as stack:
+        window = stack.enter_context(Window(wishes.scene, (frames.size[0] * factor, frames.size[1] * factor)))
+        _show(window, Playback(frames, first, end, window.wake), config, wishes, stack)
+
+
+def _show(window: Window, source: Source, config: Config, wishes: Wishes, stack: ExitStack) -> None:
+    viewer = Viewer(window, source, config, wishes)
+    stack.callback(viewer.release)
+    print(f"{keys.text()}\n", flush=True)
+    window.show()
+    viewer.loop()
 
 
 class Viewer:
     """One open window. What is shown is in ``state``; keys and the panel change nothing else."""
 
-    def __init__(self, window: Window, stage: Stage, config: Config, wishes: Wishes) -> None:
+    def __init__(self, window: Window, stage: Source, config: Config, wishes: Wishes) -> None:
         self.window, self.stage, self._wishes = window, stage, wishes
         self.state = State(config, wishes.denoiser, wishes.animate, hud=wishes.hud)
-        self._base = config.render.width, config.render.height
+        self._base = stage.size or (config.render.width, config.render.height)
         self._size = self._base
         with ExitStack() as stack:
             stack.callback(lambda: self.stage.close())  # whichever it is by then
@@ -106,9 +128,12 @@ class Viewer:
             stack.callback(self._textures.release)
             self._overlay = Overlay(window.ctx)
             stack.callback(self._overlay.release)
+            self._live = LiveError(window.ctx, window.wake)
+            stack.callback(self._live.release)
             self._stack = stack.pop_all()
         self._calibration: Calibration | None = None
         self._opening: Opening | None = None
+        self._keeper = Keeper(wishes.recorder, wishes.out, self.state)
         self._refused = ""  # why a scene could not be opened
         self._held = HeldKeys()
         self._cursor = Cursor(0.0, 0.0)
@@ -134,6 +159,8 @@ class Viewer:
             packet = None if self.stage.idle else self.stage.take()
             if self.stage.idle:
                 self._begin()
+            if packet is not None:
+                self._keeper.keep(packet, self.stage)
             fresh = packet is not None and self._filter(packet)
             if self._result is not None and (fresh or self._stale):
                 self._show(self._result, fresh)
@@ -144,6 +171,8 @@ class Viewer:
             print(f"OpenGL reports {error}: a mistake of this program, or of the driver", file=sys.stderr)
         if self._opening is not None:
             self._opening.close()
+        self._save_path()
+        self._keeper.stop()
         self._stack.close()
 
     def _handle(self, event: Event) -> None:
@@ -155,7 +184,9 @@ class Viewer:
         match event:
             case Key(name, pressed) if name in keys.BY_KEY:
                 binding = keys.BY_KEY[name]
-                if binding.action is Action.FLY:
+                if pressed and not taken and self._refused_by_source(binding.action):
+                    pass
+                elif binding.action is Action.FLY:
                     # A key that is let go of is let go of, whoever has the keyboard by now.
                     if not pressed:
                         self._held.release(binding.value, now)
@@ -165,15 +196,15 @@ class Viewer:
                     self.state.perform(binding)
                     self._stale = True
             case MouseButton(button, pressed) if button == _RIGHT:
-                self.state.looking = pressed and not taken
+                self.state.looking = pressed and not taken and not self._refused_by_source(Action.FLY)
             case Cursor(x, y):
                 if self.state.looking:
                     self.stage.look(x - self._cursor.x, y - self._cursor.y)
                 self._cursor = event
                 self._stale |= self.state.split or self.state.look.zoom > 0
             case Wheel(steps) if not taken:
-                self.stage.control.change_speed(steps)
-                self.state.news = f"flight speed {self.stage.control.speed:.3g} units a second"
+                self.state.news = self.stage.change_speed(steps)
+                self._stale = True
             case DroppedFiles(paths):
                 self.state.scene = paths[0]
             case Focus(gained=False):
@@ -183,6 +214,13 @@ class Viewer:
                 self._stale = True
         if self._overlaid and not overlaid:
             self._overlay.resume(self._cursor)
+
+    def _refused_by_source(self, action: Action) -> bool:
+        """Whether what the frames come from has no use for ``action``, which is told then."""
+        refusal = self.stage.refusal(action)
+        if refusal:
+            self.state.news, self._stale = refusal, True
+        return bool(refusal)
 
     @property
     def _overlaid(self) -> bool:
@@ -203,6 +241,11 @@ class Viewer:
             self._calibration = None
             rungs, state.resolution = state.resolution, 0
             self._resize(step(self._base, self._size, rungs))
+        if not state.path:
+            self._save_path()
+        self._keeper.follow(self.stage)
+        if state.recording:
+            self._calibration = None  # all pictures of a recording have one size
         if state.next_scene:
             state.next_scene = False
             names = list(assets.SCENES)
@@ -234,20 +277,28 @@ class Viewer:
             self.state.news = str(error).partition("\n")[0]
             self._refused = str(error)
             return
+        self._save_path()
+        self._keeper.stop()
         self.stage.close()
         self.stage = Stage(shot, self._wishes.camera != "still", self.window.wake)
         self.status.scene, self.status.packet, self.status.result = self.stage.name, None, None
         self.state.news = "\n".join(opening.notices).partition("\n")[0] or f"opened {self.stage.name}"
         self._calibrate()
 
+    def _save_path(self) -> None:
+        """Write the cameras that were noted, if any were."""
+        if path := self.stage.take_path():
+            self.state.tell(save_path(self._wishes.out, path, self.stage.name))
+
     def _calibrate(self) -> None:
         """Look for the resolution to show this scene in."""
-        if self._wishes.calibrate:
+        if self._wishes.calibrate and self.stage.size is None:
             self._calibration = Calibration(self._base)
             self._resize(self._calibration.size)
 
     def _resize(self, size: Size) -> None:
         if size != self._size:
+            self._keeper.stop()
             self._size = size
             self.state.tell(f"{size[0]}x{size[1]} pixels")
             self._pace.clear()
@@ -255,7 +306,7 @@ class Viewer:
     def _begin(self) -> None:
         """Let the next frame be traced, unless its scene is about to be left."""
         if self._opening is None or not self._opening.done:
-            self.stage.begin(self.state, self._size, self._held)
+            self.stage.begin(self.state, self._size, self._held, settled=not self._filters.progress)
 
     def _filter(self, packet: FramePacket) -> bool:
         """Make the next picture of ``packet``; returns whether there is one."""
@@ -272,14 +323,18 @@ class Viewer:
             self._resize(self._calibration.size)
         status, profile = self.status, self._filters.profile
         status.show(packet, self._result)
-        status.triangles = self.stage.shot.scene.scene.triangle_count
+        status.triangles = self.stage.triangles
         status.fps, status.trace_ms = self._pace.fps, self._pace.trace_ms
+        status.work = self._pace.work = self.stage.work
         status.passes = profile.rows() if profile else []
         if not self.state.hud:
             status.bad = None
         elif packet.index % _COUNT_EVERY == 0:
             status.bad = count_bad(self._result)
-        status.errors = [*self._filters.errors, *filter(None, [self._refused])]
+        status.resting = self.stage.resting
+        status.errors_now = self._live.update(now, self._result, self.stage.snapshot, self.state.error_map)
+        self._log.error(status.errors_now)
+        status.errors = [*self._filters.errors, *filter(None, [self._refused, self._live.trouble])]
         self._log.frame(packet.index, packet.size, self._result.plan, status.errors)
         return True
 
@@ -287,12 +342,15 @@ class Viewer:
         """Draw the last picture, at whatever size the window now has. ``fresh``: it has not been drawn before."""
         state, screen, size = self.state, self.window.ctx.screen, self.window.framebuffer_size
         picture = result.outputs["display"]
+        if state.error_map and self._live.map is not None:
+            picture = self._live.map
         scale = size[0] / max(self.window.size[0], 1)
         column, row = int(self._cursor.x * scale), size[1] - 1 - int(self._cursor.y * scale)
         self.status.cursor = _pixel(column, row, picture.size, size)
-        looked_at = state.view != PICTURE or state.look.zoom > 0
+        looked_at = picture is not self._live.map and (state.view != PICTURE or state.look.zoom > 0)
         if not (looked_at and self._textures.draw(state, self.status, screen, size)):
-            self._presenter.draw(picture, screen, size, result.outputs.get("noisy"), column)
+            noisy = None if picture is self._live.map else result.outputs.get("noisy")
+            self._presenter.draw(picture, screen, size, noisy, column)
         self.status.progress = self._progress
         if self._overlaid:
             self._overlay.draw(self.window.size, size, self.window.content_scale, state, self.status)

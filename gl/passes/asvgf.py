@@ -13,7 +13,7 @@ Deviations from the paper, in every preset; docs/asvgf.md has the measurements:
 
 The preset ``best`` lets the history follow the light (``follow``): what was accumulated is multiplied by the factor
 that the light has changed by. λ as published says which part of the light is new, a few per cent in every frame of a
-moving lamp, and shortens a history of ten frames by as little. ``gain`` multiplies it; ten works, but is noisy.
+moving lamp, and shortens a history of ten frames by as little. ``gain`` multiplies it; ten works, at a price in noise.
 """
 
 from __future__ import annotations
@@ -125,7 +125,13 @@ def change_of(g: Graph, direct: Tex, indirect: Tex, guides: Guides, p: Asvgf, pi
 
 
 def asvgf(
-    g: Graph, signals: dict[str, Tex], noisy: tuple[Tex, Tex], guides: Guides, p: Asvgf, pixel_size: float
+    g: Graph,
+    signals: dict[str, Tex],
+    noisy: tuple[Tex, Tex],
+    guides: Guides,
+    p: Asvgf,
+    pixel_size: float,
+    specular_albedo: Tex | None = None,
 ) -> dict[str, Tex]:
     """Filter ``signals`` as :func:`gl.passes.svgf.svgf` does. ``noisy``: direct and indirect samples of the frame."""
     changes: dict[str, Change] = {}
@@ -133,5 +139,6 @@ def asvgf(
         with g.scope("asvgf"):
             joint = len(signals) == 1
             found = change_of(g, *noisy, guides, p, pixel_size, joint)
-        changes = {name: Change(found, i, p.power if p.cut == "power" else None) for i, name in enumerate(signals)}
-    return svgf(g, signals, guides, p, pixel_size, "asvgf", changes)
+        known = [name for name in signals if name != "specular"]
+        changes = {name: Change(found, i, p.power if p.cut == "power" else None) for i, name in enumerate(known)}
+    return svgf(g, signals, guides, p, pixel_size, "asvgf", changes, specular_albedo)

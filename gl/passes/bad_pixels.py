@@ -27,9 +27,18 @@ class MarkBad(ComputePass):
     out_color = Out("rgba16f", "the colour, red where it is bad, linear")
 
 
+class MarkBadGlossy(MarkBad):
+    """The same, with one noisy signal more."""
+
+    in_specular = In("noisy specular light over its albedo")
+
+
 def mark_bad(g: Graph, color: Tex, radiance: Tex, samples: dict[str, Tex]) -> Outputs:
     """Add the marks to ``color``, which must be after everything with a history, and the count.
 
-    ``samples``: ``in_direct`` and ``in_indirect``, or nothing for a picture that is not filtered from samples.
+    ``samples``: ``in_direct``, ``in_indirect`` and ``in_specular`` where there is one, or nothing for a picture that is
+    not filtered from samples.
     """
-    return g.add(MarkBad(defines={"TILE": TILE}), in_color=color, in_radiance=radiance, **samples)
+    glossy = "in_specular" in samples
+    work = MarkBadGlossy(defines={"TILE": TILE, "GLOSSY": 1}) if glossy else MarkBad(defines={"TILE": TILE})
+    return g.add(work, "mark_bad", in_color=color, in_radiance=radiance, **samples)

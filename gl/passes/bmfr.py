@@ -20,19 +20,19 @@ Deviations from the paper:
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 from config import Bmfr
 from gl.graph import ComputePass, FragmentPass, Graph, In, Out, Prev, Tex, Uniform
 from gl.passes.asvgf import LAMBDA
 from gl.passes.fast_history import FastHistory
 from gl.passes.temporal import Guides
-from raytrace.frame import Basis, Vector
+from raytrace.frame import Basis, CameraStep, Vector
 
 REPROJECTION = "xy: position in the last frame, texel units; z: mask of the 2x2 valid taps; w: history length N, frames"
 SAMPLES = "rgb: accumulated irradiance, finite; a: frames in it, 0 where there is none"
 
-COMPONENTS: Final = {"1": 1, "n": 3, "w": 3, "w2": 3, "w3": 3, "albedo": 3, "depth": 1}
+COMPONENTS: Final = {"1": 1, "n": 3, "w": 3, "w2": 3, "w3": 3, "albedo": 3, "roughness": 1, "depth": 1}
 """Numbers that each feature contributes to a row."""
 
 OFFSETS: Final = (
@@ -57,7 +57,7 @@ class View:
     """What a frame's camera and its renderer tell the filter besides textures.
 
     ``basis``, ``jitter``, ``pixel_size``, ``index``: as in the :class:`FramePacket`. ``threads``: invocations that work
-    on a block.
+    on a block. ``step``: how the camera has moved, where histories are to be looked for as if nothing else had.
     """
 
     basis: Basis
@@ -65,6 +65,7 @@ class View:
     pixel_size: float
     index: int
     threads: int
+    step: CameraStep | None = None
 
     @property
     def rows(self) -> tuple[Vector, ...]:
@@ -106,6 +107,17 @@ class AccumulateAdaptive(Accumulate):
     in_lambda = In(LAMBDA)
 
 
+class AccumulateInPlace(Accumulate):
+    """The same, but points are looked for where they are now, as the authors do: what moves finds another or none."""
+
+    u_turn = Uniform("mat3", "from this frame's camera space to the last frame's")
+    u_step = Uniform("vec3", "the same, added after that, scene units")
+
+
+class AccumulateInPlaceAdaptive(AccumulateInPlace, AccumulateAdaptive):
+    """Both."""
+
+
 class Samples(FragmentPass):
     """This frame's samples alone, in the form in which :class:`Accumulate` hands them on."""
 
@@ -134,6 +146,7 @@ class Fit(ComputePass):
     u_noise = Uniform("float", "[0;1] largest noise added to a feature")
     u_rank_tolerance = Uniform("float", "> 0, what of a feature is neglected, root of the mean square over the block")
     u_caution = Uniform("float", ">= 0, variances that noise is expected to explain in a feature of a part")
+    u_fresh_caution = Uniform("float", ">= 0, the same where the samples are means of few frames")
 
     def __init__(self, p: Bmfr, view: View) -> None:
         shift = OFFSETS[view.index % len(OFFSETS)]
@@ -145,6 +158,7 @@ class Fit(ComputePass):
                 "NOISE": int(p.regularization != "rank"),
                 "UNIT": int(p.unit_scale),
                 **({"PARTS": part_count(p), "PART": p.part_side} if p.part_side else {}),
+                **({"FRESH": p.short_history} if p.part_side and p.short_history else {}),
             },
             u_view=view.rows,
             u_jitter=view.jitter,
@@ -153,12 +167,19 @@ class Fit(ComputePass):
             u_noise=p.noise,
             u_rank_tolerance=1e-7 if p.regularization == "noise" else p.rank_tolerance,
             u_caution=p.caution,
+            u_fresh_caution=p.fresh_caution,
         )
 
     def work_groups(self, size: tuple[int, int]) -> tuple[int, int]:
         """One more than the blocks of an unshifted grid, in x and in y."""
         x, y = super().work_groups(size)
         return x + 1, y + 1
+
+
+class FitRough(Fit):
+    """The same with roughness among the features."""
+
+    in_roughness = In("a: the surface's roughness")
 
 
 class AccumulateFit(FragmentPass):
@@ -179,8 +200,11 @@ class AccumulateFitAdaptive(AccumulateFit):
 
 
 def layout(features: str) -> dict[str, int]:
-    """``FEATURES``, the length of a row, and for each feature ``X_AT``, its place there; -1 for what is not listed."""
-    places = {f"{name.upper()}_AT": -1 for name in COMPONENTS if name != "1"}
+    """``FEATURES``, the length of a row, and for each feature ``X_AT``, its place there; -1 for what is not listed.
+
+    There is no ``ROUGHNESS_AT`` without that feature, which few scenes have.
+    """
+    places = {f"{name.upper()}_AT": -1 for name in COMPONENTS if name not in ("1", "roughness")}
     length = 0
     for name in features.split(","):
         if name != "1":
@@ -206,42 +230,48 @@ def thread_count(features: str, software: bool, parts: int = 0) -> int:
 def shared_bytes(features: int, threads: int, parts: int = 0) -> int:
     """Shared memory of ``bmfr/fit.comp``: half of the triangles and all of the parts', bounds of position, weights."""
     slots = max(threads // 2, 1) + parts
-    triangle = features * (features + 7) // 2 + (1 if parts else 0)
+    triangle = features * (features + 7) // 2 + (2 if parts else 0)
     return 4 * triangle * slots + 2 * 16 * threads + 16 * features * (1 + parts)
 
 
 def bmfr(
     g: Graph,
     signals: dict[str, Tex],
-    albedo: Tex,
+    features: dict[str, Tex],
     guides: Guides,
     p: Bmfr,
     view: View,
+    name: str = "bmfr",
     change: Tex | None = None,
 ) -> Tex:
     """Filter the sum of ``signals`` (noisy irradiance by name: "direct" and, if it is apart, "indirect"); returns the
-    clean one. Histories are named by whether the signals hold the albedo.
+    clean one. Histories are named by ``name`` and by whether the signals hold the albedo.
 
-    ``change``: what :func:`gl.passes.asvgf.change_of` knows of the light, both signals being one.
+    ``features``: textures of features that are no guides, "albedo" and where there is one "roughness". ``change``: what
+    :func:`gl.passes.asvgf.change_of` knows of the light, both signals being one.
     """
     inputs = {f"in_{name}": noisy for name, noisy in signals.items()}
-    names = "bmfr" if p.demodulate else "bmfr.radiance"
+    names = name if p.demodulate else f"{name}.radiance"
     extra = {} if change is None else {"in_lambda": change}
+    work = _ACCUMULATIONS[view.step is not None, change is not None]
+    moved: dict[str, Any] = {} if view.step is None else {"u_turn": view.step[0], "u_step": view.step[1]}
+    before = guides.optional if view.step is None else {}
     adaptive = {} if change is None else {"ADAPTIVE": 1}
-    with g.scope("bmfr"):
+    with g.scope(name):
         if not p.temporal:
             samples = g.add(Samples(), in_surface=guides.surface, **inputs).out_color
-            return _fit(g, samples, albedo, guides, p, view) if p.fit else samples
+            return _fit(g, samples, features, guides, p, view) if p.fit else samples
         noisy, guide = g.history(f"{names}.noisy", "rgba16f"), g.history(f"{names}.guide", "rg32f")
         found = g.add(
-            (Accumulate if change is None else AccumulateAdaptive)(
+            work(
                 u_view=view.rows,
                 u_pixel_size=view.pixel_size,
                 u_alpha=p.alpha,
                 u_max_history=float(p.max_history),
                 u_position_tolerance=p.position_tolerance,
                 u_normal_tolerance=p.normal_tolerance,
-                defines={"ROUND_HISTORY": int(p.round_history), **adaptive},
+                defines={"ROUND_HISTORY": int(p.round_history), **adaptive, **({"IN_PLACE": 1} if moved else {})},
+                **moved,
             ),
             "accumulate",
             in_motion=guides.motion,
@@ -249,7 +279,7 @@ def bmfr(
             prev_color=noisy,
             prev_guide=guide,
             **inputs,
-            **guides.optional,
+            **before,
             **extra,
         )
         accumulated, fast = found.out_color, None
@@ -264,7 +294,7 @@ def bmfr(
         clean = g.add(
             (AccumulateFit if change is None else AccumulateFitAdaptive)(u_alpha=p.alpha_fit, defines=adaptive),
             "accumulate_fit",
-            in_color=_fit(g, accumulated, albedo, guides, p, view),
+            in_color=_fit(g, accumulated, features, guides, p, view),
             in_reprojection=found.out_reprojection,
             prev_color=fitted,
             **extra,
@@ -275,6 +305,16 @@ def bmfr(
         return clean
 
 
-def _fit(g: Graph, samples: Tex, albedo: Tex, guides: Guides, p: Bmfr, view: View) -> Tex:
-    features = {"in_albedo": albedo} if "albedo" in p.features.split(",") else {}
-    return g.add(Fit(p, view), in_color=samples, in_surface=guides.surface, **features).out_color
+_ACCUMULATIONS: Final[dict[tuple[bool, bool], type[Accumulate]]] = {
+    (False, False): Accumulate,
+    (False, True): AccumulateAdaptive,
+    (True, False): AccumulateInPlace,
+    (True, True): AccumulateInPlaceAdaptive,
+}
+"""By whether what moves is looked for where it is now, and whether light is known to have changed."""
+
+
+def _fit(g: Graph, samples: Tex, features: dict[str, Tex], guides: Guides, p: Bmfr, view: View) -> Tex:
+    used = {f"in_{name}": texture for name, texture in features.items() if name in p.features.split(",")}
+    work = FitRough(p, view) if "in_roughness" in used else Fit(p, view)
+    return g.add(work, "fit", in_color=samples, in_surface=guides.surface, **used).out_color

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 from config import Display
 from gl.graph import FragmentPass, Graph, In, Out, Tex, Uniform
+
+GLOSSY: Final = {"GLOSSY": 1}
+"""``#define`` of programs that know of specular light; those of scenes without are compiled as if there were none."""
 
 OPERATORS = {"none": 0, "reinhard": 1, "aces": 2}
 
@@ -18,6 +23,28 @@ class Combine(FragmentPass):
     out_color = Out("rgba32f", "the sum, times albedo where that is connected")
 
 
+class CombineGlossy(Combine):
+    """The same with specular light, all as radiance."""
+
+    in_specular = In("specular light over its albedo")
+    in_specular_albedo = In("rgb: divisor of the specular light; a: roughness")
+
+
+class Total(FragmentPass):
+    """Direct, indirect and specular light as one: radiance over the whole directional albedo of the surface.
+
+    Where that is black, the illumination of a white diffuse surface takes its place.
+    """
+
+    shader = "display/total.frag"
+    in_direct = In("irradiance")
+    in_indirect = In("irradiance")
+    in_specular = In("specular light over its albedo")
+    in_albedo = In("divisor of the irradiance")
+    in_specular_albedo = In("rgb: divisor of the specular light; a: roughness")
+    out_color = Out("rgba32f", "radiance over the sum of both albedos")
+
+
 class Modulate(FragmentPass):
     """Full radiance: (direct + indirect) x albedo + emission. Schied et al. 2017, sec. 4."""
 
@@ -27,6 +54,16 @@ class Modulate(FragmentPass):
     in_albedo = In("divisor of the irradiance", optional=True)
     in_emission = In("radiance emitted by the surface seen or by the sky")
     out_radiance = Out("rgba32f", "linear radiance")
+
+
+class ModulateGlossy(Modulate):
+    """The same with specular light: (direct + indirect) x albedo + specular x its albedo + emission.
+
+    With a specular albedo and no specular signal ``in_direct`` is all light at once, over the sum of both albedos.
+    """
+
+    in_specular = In("specular light over its albedo; radiance where none is connected", optional=True)
+    in_specular_albedo = In("rgb: divisor of the specular light; a: roughness", optional=True)
 
 
 class Tonemap(FragmentPass):
@@ -50,6 +87,20 @@ class Encode(FragmentPass):
     shader = "display/encode.frag"
     in_color = In("tone-mapped colour, linear")
     out_color = Out("rgba8", "sRGB")
+
+
+def combine(g: Graph, name: str, /, **inputs: Tex) -> Tex:
+    """Add :class:`Combine`, or with the ports of a specular signal :class:`CombineGlossy`."""
+    if "in_specular" in inputs:
+        return g.add(CombineGlossy(defines=GLOSSY), name, **inputs).out_color
+    return g.add(Combine(), name, **inputs).out_color
+
+
+def modulate(g: Graph, **inputs: Tex) -> Tex:
+    """Add :class:`Modulate`, or with a port of specular light :class:`ModulateGlossy`."""
+    if "in_specular" in inputs or "in_specular_albedo" in inputs:
+        return g.add(ModulateGlossy(defines=GLOSSY), "modulate", **inputs).out_radiance
+    return g.add(Modulate(), **inputs).out_radiance
 
 
 def tonemap(g: Graph, radiance: Tex, p: Display, exposure: Tex | None = None) -> Tex:

@@ -35,25 +35,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from types import MappingProxyType
+from typing import Any
 
 from config import Svgf
 from gl.graph import FragmentPass, Graph, In, Out, Tex, Uniform
-from gl.passes.fast_history import FastHistory
-from gl.passes.temporal import REPROJECTION, Change, Guides, accumulate, reproject
-
-
-class Variance(FragmentPass):
-    """Replace the temporal variance by a spatial estimate where the history is shorter than four frames (sec. 4.2)."""
-
-    shader = "svgf/variance.frag"
-    in_color = In("rgb: irradiance; a: standard deviation over time")
-    in_moments = In("first and second moment of luminance", optional=True)
-    in_surface = In("xyz: shading normal, world; w: depth, scene units")
-    in_gradient = In("depth change per pixel, scene units")
-    in_reprojection = In(REPROJECTION, optional=True)
-    out_color = Out("rgba16f", "rgb: irradiance, unchanged unless PREFILTER; a: standard deviation")
-    u_sigma_z = Uniform("float", "> 0, depth edge-stopping")
-    u_pixel_size = Uniform("float", "> 0, scene units a pixel is wide at depth 1")
+from gl.passes.display import GLOSSY
+from gl.passes.temporal import REPROJECTION, Change, Guides, reproject
+from gl.passes.variance import GLOSS, estimate
 
 
 class Atrous(FragmentPass):
@@ -71,20 +59,38 @@ class Atrous(FragmentPass):
     u_sigma_l = Uniform("float", "> 0, luminance edge-stopping in standard deviations")
     u_pixel_size = Uniform("float", "> 0, scene units a pixel is wide at depth 1")
 
-    def __init__(self, p: Svgf, step: int, pixel_size: float, raw: bool = False) -> None:
+    def __init__(self, p: Svgf, step: int, pixel_size: float, raw: bool = False, glossy: bool = False) -> None:
+        gloss: dict[str, Any] = {"u_sigma_r": p.sigma_r, "u_reach": p.reach} if glossy else {}
         super().__init__(
             defines={
                 "STEP": step,
                 "SIGMA_N_SQUARINGS": squarings(p.sigma_n),
                 "LUMINANCE_STOP": int(p.variance_guided),
                 "RAW": int(raw),
+                **(GLOSSY if glossy else {}),
             },
             u_accumulated_variance=p.alpha / (2.0 - p.alpha),
             u_sigma_z=p.sigma_z,
             u_sigma_n=float(p.sigma_n),
             u_sigma_l=p.sigma_l * (p.first_sigma_l if step == 1 else 1.0),
             u_pixel_size=pixel_size,
+            **gloss,
         )
+
+
+class GlossyAtrous(Atrous):
+    """The same for specular light, in which only surfaces of the same roughness have a part.
+
+    What a narrow lobe reflects has edges that no guide shows, and less noise than a wide one: the distance over which
+    it is averaged grows with the lobe's width, as in NVIDIA's NRD.
+    """
+
+    in_specular_albedo = In(GLOSS)
+    u_sigma_r = Uniform("float", "> 0, roughness edge-stopping")
+    u_reach = Uniform("float", "> 0, pixels per squared roughness")
+
+    def __init__(self, p: Svgf, step: int, pixel_size: float, raw: bool = False) -> None:
+        super().__init__(p, step, pixel_size, raw, glossy=True)
 
 
 def squarings(exponent: int) -> int:
@@ -101,8 +107,10 @@ def svgf(
     pixel_size: float,
     method: str = "svgf",
     changes: Mapping[str, Change] = MappingProxyType({}),
+    specular_albedo: Tex | None = None,
 ) -> dict[str, Tex]:
-    """Filter each of ``signals`` (noisy irradiance by name, "direct", "indirect" or "both"); returns the clean ones.
+    """Filter each of ``signals`` (noisy irradiance by name, "direct", "indirect", "specular", or "both" for all as
+    one); returns the clean ones. ``specular_albedo`` (:data:`GLOSS`) steers the filter of specular light.
 
     ``method``: whose passes and histories these are. ``changes``: what is known of each signal's change of light.
 
@@ -116,7 +124,9 @@ def svgf(
         for signal, noisy in signals.items():
             with g.scope(signal):
                 change = changes.get(signal)
-                clean[signal] = _filter_signal(g, f"{names}.{signal}", noisy, found, guides, p, pixel_size, change)
+                gloss = specular_albedo if signal == "specular" else None
+                name = f"{names}.{signal}"
+                clean[signal] = _filter_signal(g, name, noisy, found, guides, p, pixel_size, change, gloss)
         return clean
 
 
@@ -129,34 +139,22 @@ def _filter_signal(
     p: Svgf,
     pixel_size: float,
     change: Change | None,
+    gloss: Tex | None,
 ) -> Tex:
-    x = noisy
-    estimate: dict[str, Tex] = {}
-    history = None
-    if reprojection is not None:
-        history = g.history(name, "rgba16f")
-        x, moments = accumulate(g, x, reprojection, history, p, clamp=p.clamp, change=change)
-        if p.fast_clamp:
-            x = FastHistory(g, name, noisy, None, reprojection, p).bound(x)
-        if change is not None:
-            reprojection = moments  # where the length of this signal's own history is
-        estimate = {"in_moments": moments, "in_reprojection": reprojection}
-    # Without time there is no other variance than the one in space; without guidance by variance there is none at all.
-    shape = {"in_surface": guides.surface, "in_gradient": guides.gradient}
-    if p.variance_guided:
-        prefilter = {"PREFILTER": 1} if p.prefilter else None
-        stage = Variance(u_sigma_z=p.sigma_z, u_pixel_size=pixel_size, defines=prefilter)
-        unfiltered, x = x, g.add(stage, in_color=x, **shape, **estimate).out_color
-    else:
-        unfiltered = x
+    history = g.history(name, "rgba16f") if reprojection is not None else None
+    unfiltered, x, length = estimate(g, noisy, reprojection, history, guides, p, pixel_size, change, gloss)
     if history is not None and p.feedback < 0:
         g.feed(history, unfiltered)
-    length: dict[str, Tex] = {}
-    if reprojection is not None and p.variance_guided and p.accumulated_variance:
-        length = {"in_reprojection": reprojection}
+    atrous = Atrous if gloss is None else GlossyAtrous
+    shape = {"in_surface": guides.surface, "in_gradient": guides.gradient}
+    if gloss is not None:
+        shape["in_specular_albedo"] = gloss
+    mean: dict[str, Tex] = {}
+    if length is not None and p.variance_guided and p.accumulated_variance:
+        mean = {"in_reprojection": length}
     for i in range(p.iterations):
-        iteration = Atrous(p, 1 << i, pixel_size, raw=x is noisy)
-        x = g.add(iteration, f"atrous{i}", in_color=x, **shape, **(length if i == 0 else {})).out_color
+        iteration = atrous(p, 1 << i, pixel_size, raw=x is noisy)
+        x = g.add(iteration, f"atrous{i}", in_color=x, **shape, **(mean if i == 0 else {})).out_color
         if history is not None and i == p.feedback:
             g.feed(history, x)  # no copy: x is written into the history's other half
     return x

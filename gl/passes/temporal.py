@@ -15,7 +15,9 @@ Deviations from the paper:
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Final, Protocol
 
 from gl.graph import FragmentPass, Graph, History, In, Out, Prev, Tex, Uniform
@@ -25,6 +27,8 @@ REPROJECTION = (
     " w: history length N, frames"
 )
 GUIDE = "x: normal, octahedral; y: depth; z: object id; w: history length h + cosine of the view angle"
+
+SAMPLE = "rgb: irradiance, finite; a: 1, or 0 where there is none"
 
 CLAMP_RADIUS: Final = 3
 """Of the window whose colours bound the history's, in pixels.
@@ -84,6 +88,17 @@ class Accumulate(FragmentPass):
     u_alpha_moments = Uniform("float", "[0;1] smallest weight of the new sample in the moments")
 
 
+class Blend(FragmentPass):
+    """Blend a colour with the history, without any moments."""
+
+    shader = "temporal/blend.frag"
+    in_color = In(f"{SAMPLE}; with RAW a unused")
+    in_reprojection = In(REPROJECTION)
+    prev_color = Prev(SAMPLE)
+    out_color = Out("rgba16f", SAMPLE)
+    u_alpha = Uniform("float", "[0;1] smallest weight of the new colour")
+
+
 class Neighbourhood(FragmentPass):
     """Bounds of the colours that this frame shows around each pixel: mean ± u_sigma deviations, per channel.
 
@@ -136,19 +151,31 @@ class Change:
     power: float | None
 
 
-class TemporalSettings(Protocol):
-    """The parameters of accumulation, which every method's section has."""
+class BlendClamped(Blend):
+    """The same with bounds of the history's colour."""
 
-    @property
-    def alpha(self) -> float: ...
-    @property
-    def alpha_moments(self) -> float: ...
+    in_low = In("rgb: least colour accepted from the history")
+    in_high = In("rgb: largest colour accepted from the history")
+
+
+class ReprojectionSettings(Protocol):
+    """The parameters of the search in the last frame."""
+
     @property
     def max_history(self) -> int: ...
     @property
     def depth_tolerance(self) -> float: ...
     @property
     def normal_tolerance(self) -> float: ...
+
+
+class TemporalSettings(ReprojectionSettings, Protocol):
+    """And those of accumulation with moments."""
+
+    @property
+    def alpha(self) -> float: ...
+    @property
+    def alpha_moments(self) -> float: ...
 
 
 class Guides:
@@ -161,7 +188,15 @@ class Guides:
         self.optional = {"in_prev_normal": g.import_("frame.prev_normal", "rgba32f")} if moving else {}
 
 
-def reproject(g: Graph, guides: Guides, name: str, p: TemporalSettings, pixel_size: float) -> Tex:
+def _bounds(g: Graph, color: Tex, clamp: float | None) -> dict[str, Tex]:
+    """Add the bounds of the history's colour; nothing where ``clamp`` is None."""
+    if clamp is None:
+        return {}
+    around = g.add(Neighbourhood(u_sigma=clamp, defines={"RADIUS": CLAMP_RADIUS}), in_color=color)
+    return {"in_low": around.out_low, "in_high": around.out_high}
+
+
+def reproject(g: Graph, guides: Guides, name: str, p: ReprojectionSettings, pixel_size: float) -> Tex:
     """Add the reprojection of the frame with its own history, ``name.guide``; returns the ``REPROJECTION`` texture."""
     history = g.history(f"{name}.guide", "rgba32f")
     found = g.add(
@@ -190,20 +225,21 @@ def accumulate(
     fmt: str = "rgba16f",
     clamp: float | None = None,
     change: Change | None = None,
+    alpha_moments: float | None = None,
+    variance: Mapping[str, int] = MappingProxyType({}),
 ) -> tuple[Tex, Tex]:
     """Add the accumulation of one signal into ``history``, which the caller feeds; returns colour and moments.
 
     ``clamp``: standard deviations of this frame's colours around a pixel by which the history's colour may differ from
     their mean; None: by any. ``change``: then the moments have the length of the signal's history with them.
+    ``alpha_moments``: instead of that of ``p``. ``variance``: how the shader is compiled for another estimate of it
+    (:mod:`gl.passes.variance`); the moments have a history of their own then.
     """
-    moments = g.history(f"{history.name}.moments", "rg32f" if change is None else "rgba32f")
-    extra: dict[str, Tex] = {}
-    defines: dict[str, int] = {"HALF": int(fmt == "rgba16f")}
+    kind = "centred" if "CENTRED" in variance else "moments"
+    moments = g.history(f"{history.name}.{kind}", "rg32f" if change is None else "rgba32f")
+    extra = _bounds(g, color, clamp)
+    defines: dict[str, int] = {"HALF": int(fmt == "rgba16f"), **({"CLAMPED": 1} if extra else {}), **variance}
     uniforms: dict[str, float] = {}
-    if clamp is not None:
-        around = g.add(Neighbourhood(u_sigma=clamp, defines={"RADIUS": CLAMP_RADIUS}), in_color=color)
-        extra |= {"in_low": around.out_low, "in_high": around.out_high}
-        defines["CLAMPED"] = 1
     if change is not None:
         extra["in_lambda"] = change.texture
         defines |= {"ADAPTIVE": 1, "SIGNAL": change.channel, "POWER": int(change.power is not None)}
@@ -212,7 +248,7 @@ def accumulate(
     blended = g.add(
         work(
             u_alpha=p.alpha,
-            u_alpha_moments=p.alpha_moments,
+            u_alpha_moments=p.alpha_moments if alpha_moments is None else alpha_moments,
             formats={"out_color": fmt},
             defines=defines,
             **uniforms,
@@ -235,3 +271,30 @@ _ACCUMULATIONS: Final[dict[tuple[bool, bool], type[Accumulate]]] = {
     (True, True): AccumulateAdaptiveClamped,
 }
 """By whether the colour is clamped and whether light is known to have changed."""
+
+
+def blend(
+    g: Graph,
+    color: Tex,
+    reprojection: Tex,
+    history: History,
+    alpha: float,
+    clamp: float | None = None,
+    raw: bool = False,
+) -> Tex:
+    """Add the blend of a colour with ``history``, which the caller feeds, without moments; returns the blended colour.
+
+    ``alpha``: smallest share of the new colour. ``clamp``: as for :func:`accumulate`. ``raw``: ``color`` is a sample
+    that no pass has looked at yet; otherwise its alpha says whether there is any.
+    """
+    bounds = _bounds(g, color, clamp)
+    work = BlendClamped if bounds else Blend
+    defines = ({"RAW": 1} if raw else {}) | ({"CLAMPED": 1} if bounds else {})
+    return g.add(
+        work(u_alpha=alpha, defines=defines),
+        "blend",
+        in_color=color,
+        in_reprojection=reprojection,
+        prev_color=history,
+        **bounds,
+    ).out_color

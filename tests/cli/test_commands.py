@@ -62,10 +62,10 @@ def test_bench_gets_its_arguments(app: App, monkeypatch: pytest.MonkeyPatch, tmp
     calls: list[tuple[object, ...]] = []
     monkeypatch.setattr(bench, "run", lambda settings, *rest: calls.append((settings.render.width, *rest)))
     app("bench")
-    app("bench", "--scene", "a.glb", "--scene", "cornell", "--quick", "--out", tmp_path, "--size", "8x4")
+    app("bench", "--scene", "a.glb", "--scene", "cornell", "--quick", "--html", "--out", tmp_path, "--size", "8x4")
     assert calls == [
-        (640, ("cornell", "interior"), False, Path("out/bench.json")),
-        (8, ("a.glb", "cornell"), True, tmp_path),
+        (640, ("cornell", "interior"), False, Path("out/bench.json"), False),
+        (8, ("a.glb", "cornell"), True, tmp_path, True),
     ]
 
 

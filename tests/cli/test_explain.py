@@ -48,7 +48,17 @@ def test_explain_tells_what_the_loader_has_to_say(app: App, tmp_path: Path) -> N
     assert outcome.code == 0
     assert "no light in the file: a constant white sky is added" in outcome.err
     assert "nothing in this scene moves" in outcome.err
-    assert "kernel  first_hit                                        with a sky; without textures" in outcome.out
+    assert "kernel  first_hit                                        with a sky; without" in outcome.out
+
+
+def test_explain_tells_of_an_environment(app: App, tmp_path: Path) -> None:
+    (tmp_path / "grey.hdr").write_bytes(b"#?RADIANCE\n\n-Y 4 +X 8\n" + bytes((128, 128, 128, 129)) * 32)
+    outcome = app("explain", "--environment", tmp_path / "grey.hdr")
+    assert "environment  grey.hdr, 8x4 texels, " in outcome.out
+    assert "with an environment, lamps; without" in outcome.out
+    assert "did you mean 'grey.hdr'?" in app("explain", "--environment", tmp_path / "gray.hdr").error()
+    for flag, value in (("--environment-strength", "-1"), ("--environment-rotation", "north")):
+        assert f"{flag} {value}: must be a number in [" in app("explain", flag, value).error()
 
 
 @pytest.mark.parametrize("command", ["explain", "graph"])

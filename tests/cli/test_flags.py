@@ -48,7 +48,7 @@ def test_sizes(text: str) -> None:
     ("words", "message"),
     [
         ("rendr", "rendr: there is no such command, did you mean 'render'?"),
-        ("paint", "there are: render, graph, explain, bench, scenes, doctor"),
+        ("paint", "there are: render, graph, explain, bench, record, replay, scenes, doctor"),
         ("--sizee 3x3", "--sizee: unknown flag, did you mean '--size'?"),
         ("render --frmaes=3", "--frmaes=3: unknown flag, did you mean '--frames'?"),
         ("render --frame 3", "did you mean '--frames'?"),  # a prefix is no flag either
@@ -155,9 +155,9 @@ def test_the_examples_of_the_help_can_be_typed(words: str) -> None:
 
 def test_there_is_an_example_of_each_command() -> None:
     told = {cli.parse(words.split()).command for words in examples()}
-    assert told == {cli.WINDOW, "render", "graph", "explain", "bench"}
+    assert told == {cli.WINDOW, "render", "graph", "explain", "bench", "record", "replay"}
 
 
 def test_a_parser_refuses_before_it_runs_anything() -> None:
     with pytest.raises(UserError, match="no such denoiser"):
-        cli.parse(["render", "--denoiser", "bilateral", "--scene", "interior"])
+        cli.parse(["render", "--denoiser", "median", "--scene", "interior"])

@@ -101,7 +101,7 @@ def test_what_can_be_repaired_is_and_is_told(app: App, tmp_path: Path) -> None:
         ("path.json", '{"frames": [{"camera_to_world_gl": [[1]], "yfov_deg": 45}]}', "frame 0 is no camera"),
         ("path.json", '{"frames": [{"yfov_deg": 45}]}', "camera_to_world_gl"),
         ("path.json", b"\xff\xfe\x00", "is not a camera path"),
-        ("flihgt", None, "--camera flihgt: neither still nor flight nor a file, did you mean 'flight'?"),
+        ("flihgt", None, "--camera flihgt: no camera of cornell, and no file, did you mean 'flight'?"),
     ],
 )
 def test_a_camera_path_that_cannot_be_read(

@@ -14,9 +14,10 @@ from numpy.typing import ArrayLike, NDArray
 from config import Config, Svgf, Taa, load
 from gl.executor import SHADER_ROOT, Executor, Result
 from gl.graph import ComputePass, FragmentPass, Graph, In, Out, Tex
-from gl.passes.svgf import Atrous, Variance
+from gl.passes.svgf import Atrous
 from gl.passes.taa import taa
 from gl.passes.temporal import Guides, accumulate, reproject
+from gl.passes.variance import Variance
 from gl.pipelines import FrameTraits, build
 from gl.renderer import read
 from gl.upload import Uploader

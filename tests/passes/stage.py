@@ -119,8 +119,15 @@ class Stage:
     root: Path
     executor: Executor
 
-    def run(self, plan: Plan, size: tuple[int, int] = SIZE, reset: str = "", **uploads: moderngl.Texture) -> Result:
-        return self.executor.run(plan, size, uploads, reset)
+    def run(
+        self,
+        plan: Plan,
+        size: tuple[int, int] = SIZE,
+        reset: str = "",
+        again: bool = False,
+        **uploads: moderngl.Texture,
+    ) -> Result:
+        return self.executor.run(plan, size, uploads, reset, again=again)
 
     def upload(self, values: npt.NDArray[np.float32]) -> moderngl.Texture:
         """An rgba32f texture from an array (h, w, 4)."""

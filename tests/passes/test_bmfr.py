@@ -165,7 +165,6 @@ def test_the_number_of_threads_changes_nothing_but_roundings(
     ("features", "message"),
     [
         ("n,w", 'must begin with the constant, "1"'),
-        ("1,n,roughness", "frames have no roughness yet"),
         ("1,n,n", "'n' is there twice"),
         ("1,albdeo", "unknown name 'albdeo', did you mean 'albedo'"),
         ("", "unknown name ''"),

@@ -115,8 +115,8 @@ def poisoned(spoilt: str, packet: FramePacket, index: int) -> Graph:
     """The filter with one spoilt history; output ``color``."""
     g = PoisonedGraph(spoilt)
     view = bmfr.View(STANDARD_BASIS, (0.0, 0.0), packet.pixel_size, index, 8)
-    direct, indirect, albedo = (g.import_(f"frame.{name}", "rgba32f") for name in ("direct", "indirect", "albedo"))
-    g.output("color", bmfr.bmfr(g, {"direct": direct, "indirect": indirect}, albedo, Guides(g, False), Bmfr(), view))
+    signals = {name: g.import_(f"frame.{name}", "rgba32f") for name in ("direct", "indirect")}
+    g.output("color", bmfr.bmfr(g, signals, {}, Guides(g, False), Bmfr(), view))
     return g
 
 

@@ -178,8 +178,8 @@ def test_parts_fit_into_shared_memory(features: str) -> None:
 
 
 def test_shared_memory_holds_every_part() -> None:
-    """Ten features: triangles of 85 numbers and what is left, 4 to be merged and 16 to stay; bounds; weights."""
-    assert bmfr.shared_bytes(10, 8, 16) == 4 * 86 * (4 + 16) + 2 * 16 * 8 + 16 * 10 * (1 + 16)
+    """Ten features: triangles of 85 numbers, what is left, its age, 4 to be merged and 16 to stay; bounds; weights."""
+    assert bmfr.shared_bytes(10, 8, 16) == 4 * 87 * (4 + 16) + 2 * 16 * 8 + 16 * 10 * (1 + 16)
 
 
 @pytest.mark.parametrize(
@@ -196,3 +196,31 @@ def test_the_paper_has_no_parts() -> None:
     assert bmfr.part_count(load(None, ("bmfr.preset=paper",)).bmfr) == 0
     assert bmfr.part_count(load(None, ("bmfr.preset=reference",)).bmfr) == 0
     assert [bmfr.part_count(Bmfr(part=part)) for part in (0, 16, 8)] == [0, 4, 16]
+
+
+def test_parts_are_judged_by_another_doubt_where_the_history_is_short(bench: Bench) -> None:
+    """In the first frame it is short, in the fourth no longer; threads that share a part, or the parts, agree."""
+    packets = [replace(tilted(), direct=with_alpha(noise(SIZE, i) * wave()[..., None])) for i in range(5)]
+
+    def sequence(**changes: object) -> list[F32]:
+        bench.restart()
+        return [radiance(bench, packet, i, part=8, alpha_fit=1.0, **changes) for i, packet in enumerate(packets)]
+
+    believed = sequence(caution=0.0)
+    doubted = sequence(caution=100.0)
+    fresh = sequence(caution=100.0, short_history=4, fresh_caution=0.0)
+    for i in range(3):
+        np.testing.assert_array_equal(fresh[i], believed[i])
+    for i in (3, 4):
+        np.testing.assert_array_equal(fresh[i], doubted[i])
+    assert np.abs(believed[1] - doubted[1]).max() > 0.1
+
+
+@pytest.mark.parametrize(("part", "threads"), [(16, 64), (8, 1), (8, 64)])
+def test_the_age_of_a_part_does_not_depend_on_threads(
+    bench: Bench, part: int, threads: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    changes = {"part": part, "caution": 100.0, "short_history": 2, "fresh_caution": 0.0}
+    expected = threads_of(8, monkeypatch, bench, **changes)
+    found = threads_of(threads, monkeypatch, bench, **changes)
+    np.testing.assert_allclose(found, expected, rtol=8 * HALF, atol=HALF)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from raytrace.frame import FramePacket
+from raytrace.frame import STILL, CameraStep, FramePacket
 from tests.passes.bmfr_frames import F32, SIZE, radiance, run, tilted
 from tests.passes.harness import DEPTH, HALF, PIXEL_SIZE, Bench, frame
+from tests.passes.room import flight, room, triple
 
 LENGTH = "bmfr.accumulate.out_reprojection"
 
@@ -92,3 +95,60 @@ def test_lengths_between_two_numbers_are_rounded_in_the_paper_only(bench: Bench)
     bench.restart()
     exact = lengths(bench, [start, middle, last], position_tolerance=10.0, round_history=False)[2]
     np.testing.assert_allclose(exact[:, 2:-2:2], 1.3, atol=1e-3)
+
+
+# ------------------------------------------------------------------------------------- where what moves is looked for
+
+
+def in_place(packet: FramePacket, step: CameraStep = STILL) -> FramePacket:
+    """``packet`` of a scene in which something moves, with what is known of its camera."""
+    normal = np.concatenate([packet.surface[..., :3], np.zeros_like(packet.surface[..., :1])], -1)
+    return replace(packet, prev_normal=normal, camera_step=step)
+
+
+def test_what_moves_loses_its_history_where_it_is_looked_for_in_place(bench: Bench) -> None:
+    before, now = in_place(frame(SIZE, depth=3.0)), in_place(frame(SIZE, depth=DEPTH, previous_depth=3.0))
+    assert (lengths(bench, [before, now])[1] == 1.0).all()
+    bench.restart()
+    assert (lengths(bench, [before, now], follow_motion=False)[1] == 0.0).all()
+
+
+def test_what_slides_in_its_own_plane_finds_what_was_there_before(bench: Bench) -> None:
+    """Its own neighbour, half a pattern further: the place is right, the point is not."""
+    stripes = np.broadcast_to(np.arange(SIZE[0]) // 4 % 2, SIZE[::-1])
+    first = in_place(frame(SIZE, direct=stripes))
+    then = in_place(frame(SIZE, direct=np.roll(stripes, -4, 1), shift=(4.0, 0.0)))
+    settings = {"alpha": 0.2, "fit": False}
+    followed = [radiance(bench, packet, i, **settings) for i, packet in enumerate((first, then))][1]
+    np.testing.assert_allclose(followed[:, :-4], then.direct[:, :-4, :3], atol=4 * HALF)
+    bench.restart()
+    looked = [radiance(bench, packet, i, follow_motion=False, **settings) for i, packet in enumerate((first, then))][1]
+    np.testing.assert_allclose(looked[:, :-4], 0.5, atol=4 * HALF)
+
+
+def test_where_only_the_camera_moves_both_ways_find_the_same(bench: Bench) -> None:
+    """A flight through a room: sideways, forwards, turning."""
+
+    def packets() -> list[FramePacket]:
+        made = []
+        for index in range(5):
+            now, then = flight(index), flight(max(index - 1, 0))
+            turn = np.array(then.axes()) @ np.array(now.axes()).T
+            shift = np.array(then.axes()) @ np.subtract(now.position, then.position)
+            made.append(
+                in_place(room(index, SIZE), ((triple(turn[0]), triple(turn[1]), triple(turn[2])), triple(shift)))
+            )
+        return made
+
+    followed = lengths(bench, packets())
+    bench.restart()
+    looked = lengths(bench, packets(), follow_motion=False)
+    for a, b in zip(followed, looked, strict=True):
+        assert (a == b).mean() > 0.99
+    assert followed[-1].mean() > 2.0
+
+
+def test_without_knowing_the_camera_motion_is_followed(bench: Bench) -> None:
+    """As in recorded frames, which have no camera."""
+    before, now = (replace(in_place(frame(SIZE, depth=z, previous_depth=3.0)), camera_step=None) for z in (3.0, DEPTH))
+    assert (lengths(bench, [before, now], follow_motion=False)[1] == 1.0).all()

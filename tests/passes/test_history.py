@@ -37,6 +37,31 @@ def test_reset_and_a_frame_without_feeding_invalidate_but_resume(stage: Stage) -
     assert counted(stage.run(count_plan()))[0] == 6
 
 
+def test_the_last_frame_again_has_the_histories_that_it_had(stage: Stage) -> None:
+    """However often, and whatever it reads then; the frame after it follows the last of them."""
+    assert counted(stage.run(count_plan(), again=True)) == (5, 0)  # there is no last frame
+    stage.run(count_plan())
+    result = stage.run(count_plan())
+    assert counted(result) == (7, 6)
+    for _ in range(3):
+        result = stage.run(count_plan(), again=True)
+        assert (result.histories, counted(result)) == ({"count": "valid"}, (7, 6))
+    assert counted(stage.run(count_plan(), reset="by key", again=True))[0] == 5
+    assert counted(stage.run(count_plan(), again=True)) == (7, 6)
+    assert stage.run(fill_plan(), again=True).histories == {}
+    assert stage.run(count_plan(), again=True).histories == {"count": "valid"}
+    assert counted(stage.run(count_plan())) == (8, 7)
+
+
+def test_a_history_that_is_new_in_a_frame_made_again_is_void(stage: Stage) -> None:
+    stage.run(fill_plan())
+    result = stage.run(count_plan(), again=True)
+    assert (result.histories, counted(result)[0]) == ({"count": "first use"}, 5)
+    result = stage.run(count_plan(), again=True)
+    assert (result.histories, counted(result)[0]) == ({"count": "not fed last frame"}, 5)
+    assert counted(stage.run(count_plan()))[0] == 6
+
+
 def test_resizing_and_another_format_start_from_zero(stage: Stage) -> None:
     stage.run(count_plan())
     result = stage.run(count_plan(), size=(5, 3))

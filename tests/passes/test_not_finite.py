@@ -83,8 +83,7 @@ def test_in_the_samples(bench: Bench, config: Config, value: float) -> None:
     clean, dirty = sequence(False), sequence(True)
     for before, after in zip(clean, dirty, strict=True):
         assert np.isfinite(after).all()
-        # Four of a thousand samples are missing: only their neighbours notice. Where a filter has no time to look back
-        # on, the missing one counts as black.
+        # Four of a thousand samples are missing: only their neighbours notice, and take their places.
         assert np.abs(after - before).mean() < 0.02 * before.mean()
     np.testing.assert_array_equal(clean[2], dirty[2])
     assert np.abs(dirty[3] - clean[3]).max() > 0.0

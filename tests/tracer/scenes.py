@@ -201,6 +201,58 @@ def everything() -> Scene:
     return replace(scene(meshes, materials, camera, (0.4, 0.6, 0.9)), textures=textures)
 
 
+def glossy() -> Scene:
+    """A metal ball, a varnished and textured floor, a diffuse block, a sky, a lamp: both lobes at both hits."""
+    tiles = (np.random.default_rng(7).random((9, 14, 3)) * 255).astype(np.uint8)
+    materials = [
+        Material("varnish", (0.9, 0.8, 0.7), base_texture=0, specular=True, roughness=0.2),
+        Material("copper", (0.9, 0.6, 0.4), specular=True, metallic=1.0, roughness=0.4),
+        Material("plain", (0.6, 0.5, 0.4)),
+        Material("lamp", (0.5, 0.5, 0.5), emission=(5.0, 4.0, 3.0)),
+    ]
+    corner = np.array([(0, 0), (4, 0), (4, 4), (0, 4)], dtype=np.float64)
+    ball = sphere(0.5, (0.5, 0.5, 0.0), 2)
+    meshes = [
+        mesh("floor", quad((-2, 0, 2), (2, 0, 2), (2, 0, -2), (-2, 0, -2)), 0, uvs=corner[[[0, 1, 2], [0, 2, 3]]]),
+        mesh("ball", ball, 1, normals=(ball - np.array([0.5, 0.5, 0.0])) / 0.5),
+        mesh("block", box((-1.0, 0.1, -0.3), (-0.4, 0.7, 0.3)), 2),
+        mesh("lamp", quad((-0.3, 1.8, -0.3), (0.3, 1.8, -0.3), (0.3, 1.8, 0.3), (-0.3, 1.8, 0.3)), 3),
+    ]
+    camera = Camera.look_at((0.4, 1.3, 3.4), (0.0, 0.6, 0.0), yfov_degrees=50.0)
+    what = replace(scene(meshes, materials, camera, (0.4, 0.6, 0.9)), textures=(Texture("tiles", tiles),))
+    return with_every_material(what)
+
+
+def with_every_material(what: Scene) -> Scene:
+    """``what`` and, far below it, a small patch that has all features of a material, a dim lamp, a hint of a sky.
+
+    Scenes of all tests then need the same kernels, which take long to compile.
+    """
+    first, textures = len(what.materials), len(what.textures)
+    grey = np.full((2, 2, 3), 128, np.uint8)
+    patch = Material(
+        "patch",
+        specular=True,
+        base_texture=textures,
+        metallic_roughness_texture=textures + 1,
+        normal_texture=textures + 1,
+    )
+    lamp = Material("dim", emission=(1e-4, 1e-4, 1e-4))
+    below = quad((-0.1, -90, 0.1), (0.1, -90, 0.1), (0.1, -90, -0.1), (-0.1, -90, -0.1))
+    added = mesh("patch", below, first, uvs=below[..., ::2] * 5)
+    return replace(
+        what,
+        meshes=(
+            *what.meshes,
+            replace(added, colors=np.ones((6, 4), np.float32)),
+            mesh("dim", below[:, ::-1] - np.array([0.0, 1.0, 0.0]), first + 1),
+        ),
+        materials=(*what.materials, patch, lamp),
+        textures=(*what.textures, Texture("grey", grey), Texture("plain", grey, linear=True)),
+        sky=what.sky or (1e-6, 1e-6, 1e-6),
+    )
+
+
 # ------------------------------------------------------------------------------------------------------------ tracing
 
 

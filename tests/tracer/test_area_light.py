@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from raytrace.camera import Camera
-from raytrace.kernels import SHADOW_END
+from raytrace.lights import SHADOW_END
 from raytrace.scene import Material, Mesh, Texture
 from tests.tracer.conftest import OpenTracer
 from tests.tracer.scenes import (

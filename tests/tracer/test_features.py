@@ -11,15 +11,17 @@ import pytest
 
 from bench.tracing import record
 from raytrace.compiled import compile_scene
+from raytrace.environment import Environment
 from raytrace.features import compiled_in, content_of, images_of, rays_of
 from raytrace.frame import FramePacket
 from raytrace.integrator import Settings, Tracer
 from raytrace.load import load_scene
+from raytrace.punctual import PunctualLight
 from raytrace.scene import Scene
 from raytrace.shot import Shot
-from raytrace.tables import Variant
+from raytrace.tables import Variant, variant_of
 from tests.tracer.conftest import OpenTracer
-from tests.tracer.scenes import cornell, everything, rigid
+from tests.tracer.scenes import cornell, everything, glossy, rigid
 
 SIZE = (8, 8)
 DARK = replace(
@@ -31,18 +33,24 @@ SCENES = {
     "sky and no lamp": replace(DARK, sky=(0.5, 0.5, 0.5)),
     "dark": DARK,
     "everything": everything(),
+    "glossy": glossy(),
+    "a light and an environment": replace(
+        DARK, lights=(PunctualLight("spot", "spot"),), environment=Environment("grey", np.ones((4, 8, 3), np.float32))
+    ),
 }
-ALL_IMAGES = images_of(Variant(True, True, True), positions=True)
+ALL_IMAGES = images_of(Variant(*(True for _ in Variant._fields)), positions=True, gradients=True)
+GLOSS = {"specular", "specular_albedo"}
 any_scene = pytest.mark.parametrize("what", SCENES.values(), ids=SCENES.keys())
 
 
 @pytest.mark.parametrize(
     ("what", "positions", "missing"),
     [
-        ("still", False, {"prev_normal", "position", "prev_position"}),
-        ("moving", False, {"position", "prev_position"}),
-        ("still", True, {"prev_normal"}),
-        ("everything", True, set()),
+        ("still", False, {"prev_normal", "position", "prev_position", *GLOSS}),
+        ("moving", False, {"position", "prev_position", *GLOSS}),
+        ("still", True, {"prev_normal", *GLOSS}),
+        ("everything", True, GLOSS),
+        ("glossy", True, {"prev_normal"}),
     ],
 )
 def test_frames_have_the_images_that_are_told(what: str, positions: bool, missing: set[str]) -> None:
@@ -51,12 +59,11 @@ def test_frames_have_the_images_that_are_told(what: str, positions: bool, missin
         packet = tracer.frame(0, scene.camera, scene.camera, SIZE)
         present = {f.name for f in fields(FramePacket) if isinstance(getattr(packet, f.name), np.ndarray)}
         assert set(tracer.images) == set(images_of(tracer.variant, positions)) == present
-        assert set(ALL_IMAGES) - present == missing
+        assert set(ALL_IMAGES) - present == missing | {"temporal_gradient"}, "nobody asked for gradients"
 
 
 def test_images_of_a_frame_are_all_told() -> None:
-    everything = images_of(Variant(True, True, True), positions=True, gradients=True)
-    assert tuple(f.name for f in fields(FramePacket) if "F32" in str(f.type)) == everything
+    assert {f.name for f in fields(FramePacket) if "F32" in str(f.type)} == set(ALL_IMAGES)
 
 
 @any_scene
@@ -80,15 +87,19 @@ def name(call: object) -> str:
 @any_scene
 def test_kernels_contain_what_the_scene_needs(trace: OpenTracer, what: Scene) -> None:
     tracer = trace(what)
-    textured, sky, moving = tracer.variant
+    variant = tracer.variant
     guides, first, second = (compiled_in(kernel) for kernel in tracer.kernels)
     assert guides == {
-        "textured": textured,
-        "has_sky": sky,
-        "moving": moving,
+        "textured": variant.textured,
+        "has_sky": variant.sky,
+        "environment": variant.environment,
+        "moving": variant.moving,
         "positions": tracer.settings.positions,
+        "specular": variant.specular,
     }
-    assert first == second == {"textured": textured, "has_sky": sky}
+    kinds = {name: getattr(variant, name) for name in ("textured", "lamps", "punctual", "environment")}
+    masking = {"separable": False} if variant.specular else {}
+    assert first == second == kinds | {"has_sky": variant.sky} | masking
 
 
 def test_everything_is_counted() -> None:
@@ -101,11 +112,28 @@ def test_everything_is_counted() -> None:
     assert content.texel_bytes == 3 * (14 * 9 + 7 * 4 + 3 * 2 + 1 + 4 * 4 + 2 * 2 + 1)
     assert (content.lamps, content.textured_lamps, content.double_sided_lamps) == (2, 2, 2)
     assert 0.0 < content.sky_share <= 0.5
+    assert (content.punctual, content.environment_size, content.environment_bytes) == ({}, None, 0)
     assert content.table_bytes > content.texel_bytes + tracer.scene.triangles.nbytes
 
     with Tracer(compile_scene(DARK), Settings(threads=1)) as tracer:
         content = content_of(tracer.scene, tracer.tables)
     assert (content.lamps, content.sky_share, content.textures, content.texel_bytes, content.moving) == (0, 0, 0, 0, 0)
+
+    with Tracer(compile_scene(SCENES["a light and an environment"]), Settings(threads=1)) as tracer:
+        content = content_of(tracer.scene, tracer.tables)
+    assert (content.punctual, content.environment_size) == ({"spot": 1}, (8, 4))
+    assert content.environment_bytes == 4 * (6 * 9 * 4 + 6 + 5 * 9)
+    assert 0.0 < content.sky_share <= 0.5
+
+
+def test_a_feature_that_is_compiled_in_for_nothing_changes_no_bit() -> None:
+    scene = compile_scene(cornell())
+    with Tracer(scene) as plain, Tracer(scene, variant=variant_of(scene)._replace(sky=True)) as more:
+        assert (plain.variant.sky, more.variant.sky) == (False, True)
+        camera = scene.scene.camera
+        one, other = (tracer.frame(3, camera, camera, SIZE) for tracer in (plain, more))
+    for name in plain.images:
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
 
 
 def test_files_of_one_name_are_two_scenes(tmp_path: Path) -> None:

@@ -4,28 +4,36 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 import assets
+from assets.far import OFFSET
+from assets.metals import ROUGHNESS
+from assets.sets import FLIGHT
 from errors import UserError
 from raytrace.camera import Camera
 from raytrace.scene import F64, Mesh, Scene
 
-CYCLES = {"cornell": 2.0, "interior": 12.0}  # seconds until everything that moves is back
-FLIGHTS = {"cornell": 4.0, "interior": 8.0}
+STUDIES = ("metals", "penumbra", "thin", "mirrorish", "hard")
+"""Small scenes, each for one difficulty of the filters."""
+BUILT = ("cornell", "interior", *STUDIES)
+"""All but ``far``, which is the interior elsewhere and has a test of its own."""
+CYCLES = {"cornell": 2.0, "interior": 12.0, **dict.fromkeys(STUDIES, 4.0)}  # seconds until all that moves is back
+FLIGHTS = {"cornell": 4.0, "interior": 8.0, **dict.fromkeys(STUDIES, FLIGHT)}
 ROOM = np.array([[-3.0, 0.0, -2.5], [3.0, 2.8, 2.5]])
 
 
 @pytest.fixture(scope="module")
 def scenes() -> dict[tuple[str, bool], Scene]:
-    """Every built-in scene, still and animated."""
-    return {(name, animate): assets.build(name, animate) for name in assets.SCENES for animate in (False, True)}
+    """Every built-in scene but ``far``, still and animated."""
+    return {(name, animate): assets.build(name, animate) for name in BUILT for animate in (False, True)}
 
 
-@pytest.fixture(params=[(name, animate) for name in assets.SCENES for animate in (False, True)], ids=str)
+@pytest.fixture(params=[(name, animate) for name in BUILT for animate in (False, True)], ids=str)
 def scene(request: pytest.FixtureRequest, scenes: dict[tuple[str, bool], Scene]) -> Scene:
     return scenes[request.param]
 
@@ -49,8 +57,8 @@ def emitting(scene: Scene, mesh: Mesh) -> NDArray[np.bool_]:
     return np.array([material.emits for material in scene.materials])[mesh.materials]
 
 
-def test_registry_lists_both_scenes() -> None:
-    assert list(assets.SCENES) == ["cornell", "interior"]
+def test_registry_lists_the_scenes() -> None:
+    assert tuple(assets.SCENES) == (*BUILT, "far")
     assert all(info.name == name and info.description for name, info in assets.SCENES.items())
 
 
@@ -187,7 +195,7 @@ def test_overlap_finder_finds_an_overlap_and_no_more() -> None:
     assert coplanar_overlaps(np.stack([floor, raised, shifted])) == [(0, 2)]
 
 
-@pytest.mark.parametrize("name", list(assets.SCENES))
+@pytest.mark.parametrize("name", BUILT)
 def test_no_two_faces_lie_in_one_plane_and_overlap(name: str, scenes: dict[tuple[str, bool], Scene]) -> None:
     """No z-fighting. Faces sunk behind the walls, which nobody can see, may coincide."""
     scene = scenes[name, False]
@@ -225,7 +233,7 @@ def test_cornell_lamp_hangs_below_the_ceiling_and_shines_down(scenes: dict[tuple
     assert np.linalg.norm(normals, axis=1).sum() / 2 == pytest.approx(1.3 * 1.05)
 
 
-@pytest.mark.parametrize("name", list(assets.SCENES))
+@pytest.mark.parametrize("name", BUILT)
 def test_motions_are_rigid_continuous_and_periodic(name: str, scenes: dict[tuple[str, bool], Scene]) -> None:
     moving = [mesh for mesh in scenes[name, True].meshes if mesh.motion is not None]
     assert moving
@@ -249,14 +257,14 @@ def test_motions_are_rigid_continuous_and_periodic(name: str, scenes: dict[tuple
 
 
 def test_a_light_and_an_object_move_in_each_scene(scenes: dict[tuple[str, bool], Scene]) -> None:
-    for name in assets.SCENES:
+    for name in BUILT:
         scene = scenes[name, True]
         shining = [emitting(scene, mesh).any() for mesh in scene.meshes if mesh.motion is not None]
         assert any(shining)
         assert not all(shining)
 
 
-@pytest.mark.parametrize("name", list(assets.SCENES))
+@pytest.mark.parametrize("name", BUILT)
 def test_still_scene_is_the_animated_one_at_time_zero(name: str, scenes: dict[tuple[str, bool], Scene]) -> None:
     still, animated = scenes[name, False], scenes[name, True]
     assert not still.has_motion
@@ -276,7 +284,7 @@ def flight_of(scene: Scene, name: str) -> Iterator[Camera]:
         yield scene.flight(frame / 30)
 
 
-@pytest.mark.parametrize("name", list(assets.SCENES))
+@pytest.mark.parametrize("name", BUILT)
 def test_flight_is_smooth_and_closes(name: str, scenes: dict[tuple[str, bool], Scene]) -> None:
     scene = scenes[name, False]
     assert scene.flight is not None
@@ -327,3 +335,41 @@ def test_two_builds_are_equal_to_the_bit(scenes: dict[tuple[str, bool], Scene]) 
                 assert np.array_equal(getattr(a, field), getattr(b, field)), f"{a.name}.{field}"
         for x, y in zip(first.textures, second.textures, strict=True):
             assert np.array_equal(x.pixels, y.pixels), x.name
+
+
+def test_far_is_the_interior_elsewhere() -> None:
+    home, away = assets.build("interior", True), assets.build("far", True)
+    assert away.name == "far"
+    assert away.materials == home.materials
+    for a, b in zip(home.meshes, away.meshes, strict=True):
+        assert (a.faces is b.faces) or np.array_equal(a.faces, b.faces)
+        np.testing.assert_allclose(corners(b, 0.7)[:9], corners(a, 0.7)[:9] + OFFSET, rtol=0, atol=1e-9)
+    assert home.flight is not None
+    assert away.flight is not None
+    for near, far in ((home.camera, away.camera), (home.flight(1.3), away.flight(1.3))):
+        np.testing.assert_allclose(np.array(far.position) - OFFSET, near.position, rtol=0, atol=1e-9)
+        assert far.forward == near.forward
+
+
+def test_metals_have_a_ramp_of_roughness(scenes: dict[tuple[str, bool], Scene]) -> None:
+    glossy = [material for material in scenes["metals", False].materials if material.specular]
+    assert [material.roughness for material in glossy] == 3 * list(ROUGHNESS)
+    assert {material.metallic for material in glossy} == {0.0, 1.0}
+
+
+def test_the_lamp_of_hard_is_tiny_and_hidden_from_what_the_camera_sees(scenes: dict[tuple[str, bool], Scene]) -> None:
+    """Its shade lets it shine at the wall on the right only: the rest of the room has no line of sight to it."""
+    scene = scenes["hard", False]
+    shining = np.concatenate([corners(mesh)[emitting(scene, mesh)] for mesh in scene.meshes])
+    assert np.ptp(shining.reshape(-1, 3), axis=0).max() < 0.05
+    assert max(max(material.emission) for material in scene.materials) == 1e4
+    assert {0.97, 0.012} <= {material.base_color[0] for material in scene.materials}
+    cross = np.cross(shining[:, 1] - shining[:, 0], shining[:, 2] - shining[:, 0])
+    assert (cross[:, 0] > 0.99 * np.linalg.norm(cross, axis=1)).all(), "towards the wall"
+
+
+def test_the_readme_of_the_scenes_counts_their_triangles(scenes: dict[tuple[str, bool], Scene]) -> None:
+    text = Path(assets.__file__).with_name("README.md").read_text()
+    for name in BUILT:
+        assert f"| `{name}` | {scenes[name, False].triangle_count:,} |" in text
+    assert f"| `far` | {scenes['interior', False].triangle_count:,} |" in text

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import math
 from collections.abc import Iterator
@@ -14,21 +15,26 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bench import command, memory, methods, report, tracing
+from bench import command, files, memory, methods, report, running, tracing
 from bench.cases import FRAMES, SCORED, Case, quality_case, quick_size, tracing_cases
+from bench.goals import GOALS
 from bench.machine import describe
-from bench.methods import METHODS, NOISY, MethodResult, PassTime, QualityResult, Score, Truth
+from bench.methods import METHODS, NOISY, Method
 from bench.references import Reference
-from bench.report import GOALS, Report
+from bench.results import QualityResult, Report
+from bench.running import MethodResult, PassTime
+from bench.scores import Score, Truth
 from bench.timing import Summary
 from config import Config, load
 from errors import UserError
+from gl.pipelines import DENOISERS
 from gl.renderer import Renderer
 from raytrace.frame import FramePacket
 from raytrace.shot import Shot
 from storage import replace_file, require_writable
 
 CONFIG = Config()
+MEASURED = tuple(method for method in METHODS if not method.stage and not method.quality)[:9]
 SMALL = replace(CONFIG, render=replace(CONFIG.render, width=80, height=45))
 
 
@@ -41,12 +47,12 @@ def shot() -> Iterator[Shot]:
 
 @pytest.fixture(scope="module")
 def quick(tmp_path_factory: pytest.TempPathFactory) -> Any:
-    """The JSON of one quick run."""
+    """The JSON of one quick run; the CSV and the page are beside it."""
     folder = tmp_path_factory.mktemp("bench")
     out = folder / "new" / "bench.json"
-    command.run(SMALL, ("cornell",), True, out, folder / "references")
-    assert len(list((folder / "references").iterdir())) == len(SCORED)
-    return json.loads(out.read_text())
+    command.run(SMALL, ("cornell",), True, out, True, folder / "references", MEASURED)
+    assert len(list((folder / "references").iterdir())) == len(SCORED) + 3  # and one for each event
+    return json.loads(out.read_text()) | {"folder": out.parent}
 
 
 def numbers(value: Any) -> Iterator[float]:
@@ -63,11 +69,69 @@ def test_a_quick_run_writes_everything(quick):
     assert quick["machine"]["renderer"]
     assert quick["config"]["render"]["width"] == 80
     (quality,) = quick["quality"]
-    assert [method["name"] for method in quality["methods"]] == [method.name for method in METHODS]
+    assert [method["name"] for method in quality["methods"]] == [method.name for method in MEASURED]
     assert quality["samples"] == 64
     (traced,) = quick["tracing"]
     assert traced["size"] == [80, 45]
     assert all(math.isfinite(number) for part in ("quality", "tracing") for number in numbers(quick[part]))
+
+
+@pytest.mark.gl
+def test_a_quick_run_measures_every_error(quick):
+    (quality,) = quick["quality"]
+    by_name = {contender["name"]: contender for contender in quality["contenders"]}
+    noisy, filtered = by_name[NOISY.name], by_name[methods.APART.name]
+    for error in ("rmse", "relmse", "flip", "temporal"):
+        assert 0.0 < filtered["errors"][error] < noisy["errors"][error]
+        assert 0.0 < quality["floors"][error] < noisy["errors"][error]
+    for error in ("psnr", "ssim"):
+        assert noisy["errors"][error] < filtered["errors"][error] < quality["floors"][error]
+    assert [frame["frame"] for frame in filtered["errors"]["frames"]] == list(SCORED)
+    assert noisy["milliseconds"] > quality["trace"]["median"]
+
+
+@pytest.mark.gl
+def test_path_tracing_gets_the_same_time(quick):
+    (quality,) = quick["quality"]
+    traced = {row["samples"]: row for row in quality["path_tracing"]}
+    errors = [traced[samples]["errors"]["rmse"] for samples in sorted(traced)]
+    assert errors == sorted(errors, reverse=True)
+    assert traced[1]["errors"]["rmse"] == pytest.approx(quality["methods"][0]["rmse"], rel=0.15)
+    most = max(traced)
+    # The reference is noisy, too.
+    expected = math.hypot(errors[0] / math.sqrt(most), quality["noise"])
+    assert traced[most]["errors"]["rmse"] == pytest.approx(expected, rel=0.25)
+    for contender in quality["contenders"][1 : len(MEASURED)]:
+        equal = traced[contender["equal"]["samples"]]
+        spent = contender["filter_milliseconds"] - quality["methods"][0]["milliseconds"]
+        assert equal["samples"] == 1 or (equal["samples"] - 1) * quality["sample_milliseconds"] <= spent + 1e-9
+
+
+@pytest.mark.gl
+def test_a_quick_run_has_events(quick):
+    events = quick["events"]
+    assert set(events["noise"]) == {"cut", "light switched", "disocclusion"}
+    found = {method["name"]: method for method in events["methods"]}
+    assert found["accumulation"]["flicker"] < 0.5 * found[NOISY.name]["flicker"]
+    assert found[NOISY.name]["recovery"]["cut"] <= 1
+    after = found["accumulation"]["errors"]["light switched"]
+    assert after[0] > 3.0 * after[-1]  # the old light lags
+    assert not any("TAA" in name for name in found)
+
+
+@pytest.mark.gl
+def test_a_quick_run_writes_a_table_and_a_page(quick):
+    with (quick["folder"] / "bench.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert tuple(rows[0]) == files.CSV_HEADER
+    names = [row["method"] for row in rows]
+    assert names[: len(MEASURED)] == [method.name for method in MEASURED]
+    assert [float(row["rmse"]) for row in rows[: len(MEASURED)]] == pytest.approx(
+        [method["rmse"] for method in quick["quality"][0]["methods"]], rel=1e-5
+    )
+    assert any(row["front_rmse"] == "1" for row in rows)
+    page = (quick["folder"] / "bench.html").read_text()
+    assert "SVGF, direct and indirect" in page
 
 
 @pytest.mark.gl
@@ -87,7 +151,7 @@ def test_filters_beat_the_noise_in_a_quick_run(quick):
 def test_a_quick_run_times_every_pass(quick):
     for method in quick["quality"][0]["methods"]:
         names = [row["name"] for row in method["passes"]]
-        assert names[0] == methods.UPLOAD
+        assert names[0] == running.UPLOAD
         assert names[-1] == "encode"
         assert ("taa" in names) == ("TAA" in method["name"])
         assert method["wall"]["count"] == (FRAMES - 4) // 2
@@ -174,7 +238,7 @@ def test_methods_measure_the_noisy_frame_as_it_is(ctx):
     """Frames of known error, through GL and back."""
     _, truth = constant_truth()
     packets = [flat(0.75, index) for index in range(FRAMES)]
-    (result,) = methods.measure(packets, truth, CONFIG, lambda: Renderer(ctx), 2, [NOISY])
+    (result,) = running.measure(packets, truth, CONFIG, lambda: Renderer(ctx), 2, [NOISY])
     assert result.rmse == pytest.approx(0.25)
     assert result.rmse_ratio == 1.0
     assert result.temporal == 0.0
@@ -279,7 +343,7 @@ def test_the_text_names_machine_memory_and_time():
 
 def test_json_has_null_for_what_is_no_number(tmp_path):
     path = tmp_path / "bench.json"
-    report.write_json(path, small_report(ratio=math.nan))
+    files.write_json(path, small_report(ratio=math.nan))
     content = json.loads(path.read_text())
     assert content["quality"][0]["methods"][1]["rmse_ratio"] is None
     assert content["quality"][0]["methods"][0]["rmse_ratio"] == 1.0
@@ -309,14 +373,14 @@ def test_places_that_cannot_be_written_are_told_before_the_work(tmp_path):
         with pytest.raises(UserError):
             require_writable(path)
         with pytest.raises(UserError):
-            command.run(SMALL, ("cornell",), True, path, tmp_path / "references")
+            command.run(SMALL, ("cornell",), True, path, cache=tmp_path / "references")
     require_writable(tmp_path / "new" / "bench.json")
     assert list((tmp_path / "new").iterdir()) == []
 
 
 def test_an_unknown_scene_is_told(tmp_path):
     with pytest.raises(UserError, match="cornel"):
-        command.run(SMALL, ("cornel",), True, tmp_path / "bench.json", tmp_path / "references")
+        command.run(SMALL, ("cornel",), True, tmp_path / "bench.json", cache=tmp_path / "references")
 
 
 def test_cases_of_scenes_from_files_stand_still():
@@ -347,6 +411,41 @@ def test_summaries_are_medians_and_percentiles():
     assert Summary.of([float(i) for i in range(1, 22)]) == Summary(11.0, 20.0, 21)
     with pytest.raises(ValueError, match="nothing was measured"):
         Summary.of([])
+
+
+def test_methods_get_the_frames_they_would_get_in_use(ctx, shot, monkeypatch):
+    """A-SVGF needs points that the tracer has remembered; nobody else pays for them."""
+    (adaptive,) = [method for method in METHODS if method.denoiser == "asvgf"]
+    rule = running.remembers(adaptive, CONFIG)
+    assert rule
+    assert running.remembers(NOISY, CONFIG) == running.remembers(methods.BMFR, CONFIG) == ""
+    monkeypatch.setattr(running, "trace", lambda shot: [shot.frame(index) for index in range(3)])
+    footage = running.Footage(shot)
+    assert all(packet.temporal_gradient is None for packet in footage())
+    assert all(packet.temporal_gradient is not None for packet in footage(rule))
+    assert footage(rule) is footage(rule)
+    assert shot.remember == ""
+
+
+def test_every_denoiser_is_measured_and_names_are_unique():
+    assert {method.denoiser for method in METHODS} - {"oidn"} == set(DENOISERS) - {"reference"}
+    names = [method.name for method in METHODS]
+    assert len(set(names)) == len(names)
+    assert METHODS[0] is NOISY
+
+
+@pytest.mark.parametrize("method", [method for method in METHODS if method.stage], ids=lambda method: method.name)
+def test_a_variant_differs_from_its_method(method):
+    """Or it would be measured twice and mean nothing."""
+    known = {"bmfr": methods.BMFR, "svgf": methods.ONE_SIGNAL}
+    whole = known.get(method.denoiser, Method(method.denoiser, method.denoiser))
+    assert method.configure(CONFIG) != whole.configure(CONFIG)
+
+
+def test_a_method_is_described_as_on_a_command_line():
+    described = methods.BMFR_PAPER.described
+    assert described == "--denoiser bmfr --set bmfr.preset=paper --set taa.enabled=false"
+    assert methods.APART_TAA.described == "--denoiser svgf --set svgf.separate=true"
 
 
 @pytest.mark.parametrize("separate", [True, False])

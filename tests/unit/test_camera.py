@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from errors import UserError
 from raytrace.camera import Camera
+from raytrace.camera_path import read_frames
 from raytrace.guides import camera_rays
 from raytrace.integrator import View
-from raytrace.shot import jitter_of, read_camera_path
+from raytrace.shot import jitter_of
 from tests.tracer.scenes import placed_camera
 
 F32 = NDArray[np.float32]
@@ -173,7 +174,7 @@ def test_a_camera_path_is_read_frame_by_frame(tmp_path: Path) -> None:
     first, second = np.eye(4), np.eye(4)
     second[:3, 3] = (1, 2, 3)
     frames = [{"camera_to_world_gl": m.tolist(), "yfov_deg": y} for m, y in ((first, 30), (second, 45.5))]
-    cameras = read_camera_path(write_path(tmp_path, {"frames": frames}))
+    cameras = read_frames(write_path(tmp_path, {"frames": frames}))
     assert len(cameras) == 2
     assert cameras[1].position == (1.0, 2.0, 3.0)
     assert cameras[0].forward == (0.0, 0.0, -1.0)
@@ -202,7 +203,7 @@ BROKEN: dict[str, tuple[object, str]] = {
 def test_a_broken_camera_path_is_refused_in_words(tmp_path: Path, name: str) -> None:
     content, words = BROKEN[name]
     with pytest.raises(UserError, match=words) as caught:
-        read_camera_path(write_path(tmp_path, content))
+        read_frames(write_path(tmp_path, content))
     assert "path.json" in str(caught.value)
 
 
@@ -214,4 +215,16 @@ def test_a_camera_path_that_is_no_json_or_no_file_is_refused(tmp_path: Path) -> 
         (".", "cannot be read"),
     ):
         with pytest.raises(UserError, match=words):
-            read_camera_path(tmp_path / name)
+            read_frames(tmp_path / name)
+
+
+def test_a_step_leads_from_one_camera_s_space_to_the_other_s() -> None:
+    before = Camera.look_at((1e5, 2.0, 3.0), (1e5 + 1.0, 2.5, -4.0))
+    now = Camera.look_at((1e5 + 0.3, 2.2, 2.5), (1e5 + 2.0, 2.0, -4.0))
+    point = np.array([1e5 + 1.5, 3.0, -7.0])
+    spaces = [np.array(camera.basis()) @ (point - np.array(camera.position)) for camera in (now, before)]
+    turn, shift = now.step_from(before)
+    np.testing.assert_allclose(np.array(turn) @ spaces[0] + shift, spaces[1], atol=1e-9)
+    turn, shift = now.step_from(now)
+    np.testing.assert_allclose(turn, np.eye(3), atol=1e-15)
+    assert shift == (0.0, 0.0, 0.0)

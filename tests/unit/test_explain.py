@@ -15,7 +15,7 @@ from raytrace.compiled import compile_scene
 from raytrace.features import compiled_in
 from raytrace.integrator import Settings, Tracer
 from raytrace.scene import Scene
-from tests.tracer.scenes import everything
+from tests.tracer.scenes import everything, glossy
 from tests.tracer.test_features import DARK
 
 SIZE = ("render.width=64", "render.height=36")
@@ -59,7 +59,9 @@ def row(lines: list[str], *start: str) -> str:
 
 
 @pytest.mark.parametrize("denoiser", DENOISERS)
-@pytest.mark.parametrize("scene", [assets.build("cornell"), everything(), DARK], ids=["cornell", "everything", "dark"])
+@pytest.mark.parametrize(
+    "scene", [assets.build("cornell"), everything(), DARK, glossy()], ids=["cornell", "everything", "dark", "glossy"]
+)
 def test_every_scene_and_denoiser_is_explained(subject: Subjects, scene: Scene, denoiser: str) -> None:
     text = report(subject(scene, denoiser))
     assert text.startswith(f"scene {scene.name}\n")
@@ -71,20 +73,26 @@ def test_every_scene_and_denoiser_is_explained(subject: Subjects, scene: Scene, 
 def test_the_tracer_does_what_the_scene_needs(subject: Subjects) -> None:
     lines = tracer_section(subject(everything()))
     assert lines[0] == f"tracer: up to 4 rays per path, {4 * PIXELS:,} per frame of 64x36"
-    assert row(lines, "kernel", "guides").endswith("with a sky, moving objects, textures; without world positions")
+    assert "guides with a sky, moving objects, textures; without" in " ".join(" ".join(lines).split())
     assert "two scenes" in row(lines, "Embree")
 
     lines = tracer_section(subject(DARK))
     assert lines[0].startswith("tracer: up to 2 rays per path")
     for kind in ("shadow at hit 1", "shadow at hit 2"):
         assert row(lines, "ray", kind).endswith("left out: there is no light")
-    assert row(lines, "kernel", "second_hit").endswith("without a sky, textures")
+    told = " ".join(" ".join(lines).split()).partition("kernel second_hit ")[2]
+    assert re.match(r"without (\w[^,]*, )*an environment, a sky, lamps, lights without a surface, textures", told)
     assert "one scene" in row(lines, "Embree")
+
+    shining = " ".join(" ".join(tracer_section(subject(glossy()))).split())
+    assert re.search(r"guides with [^;]*a sky, [^;]*metals and gloss, [^;]*textures; without", shining)
+    assert re.search(r"first_hit with [^;]*a sky, lamps, [^;]*textures; without", shining)
 
 
 def test_there_are_words_for_every_switch_of_a_kernel(subject: Subjects) -> None:
     tracer = subject(DARK).tracer
-    switches = {name for kernel in tracer.kernels for name in compiled_in(kernel)}
+    kernels = (*tracer.kernels, *subject(glossy()).tracer.kernels)
+    switches = {name for kernel in kernels for name in compiled_in(kernel)}
     assert switches | set(tracer.variant._fields) == set(WORDS)
 
 
@@ -115,6 +123,11 @@ def test_images_are_made_and_uploaded_for_a_reason(subject: Subjects) -> None:
     assert row(still, "motion").endswith("read by svgf.reproject, taa")
     assert row(still, "gradient").split()[1:6] == ["rg32f", "64x36", f"{PIXELS * 8:,}", "uploaded;", "read"]
 
+    assert row(still, "specular").endswith("not made: the scene has no metals and gloss")
+    shining = image_section(subject(glossy()))
+    assert row(shining, "specular").endswith("uploaded; read by svgf.specular.accumulate")
+    assert "rgba32f 64x36" in row(shining, "specular_albedo")
+
     moving = image_section(subject(everything()))
     assert row(moving, "prev_normal").endswith("uploaded; read by svgf.reproject")
 
@@ -135,7 +148,7 @@ def test_passes_are_on_and_off_for_a_reason(subject: Subjects) -> None:
     assert lines[lines.index("  svgf.iterations = 4") + 1] == "      svgf.direct.atrous3, svgf.indirect.atrous3"
 
     lines = pass_section(subject(DARK, "svgf", "svgf.separate=false"))
-    assert row(lines, "combine").endswith("  svgf.separate = false")
+    assert row(lines, "combine").endswith("  svgf.separate = false, frame.specular = false")
     assert row(lines, "svgf.both.variance").endswith("svgf.separate = false, svgf.variance_guided = true")
     assert row(pass_section(subject(DARK, "accumulate")), "accumulate.reproject").endswith("--denoiser accumulate")
 
@@ -160,5 +173,6 @@ def test_what_another_value_would_change(subject: Subjects) -> None:
     moments = 16 * PIXELS  # the two halves of a history
     assert row(lines, "taa.enabled = false").split()[-4:] == ["-1", "1", f"-{moments:,}", "0"]
     assert row(lines, "frame.moving = true").split()[-4:] == ["0", "1", f"+{16 * PIXELS:,}", f"+{16 * PIXELS:,}"]
+    assert row(lines, "frame.specular = true").split()[-4:-2] == ["+7", "4"]
     assert row(lines, "svgf.iterations = 4").split()[-4] == "-2"
     assert not [line for line in lines if "svgf.sigma_l" in line]

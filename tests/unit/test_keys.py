@@ -102,6 +102,12 @@ def test_stages_of_the_method_shown(key, name):
     assert other.news.startswith("none: has no")
 
 
+def test_stages_of_a_method_with_two_sections():
+    s = press(state("atrous-jitter"), "F1", "F3")
+    assert s.config == config.load(None, ["spatial.temporal=false", "atrous.iterations=0"])
+    assert press(s, "F8").news.endswith("atrous-jitter: has no separate")
+
+
 def test_the_wavelet_and_its_iterations():
     s = press(state(), "F3")
     assert s.config.svgf.iterations == 0
@@ -193,6 +199,12 @@ def test_wishes():
     assert s.home
     assert s.reset
     assert s.screenshot
+
+
+def test_a_camera_path_is_recorded_until_the_key_comes_again():
+    s = press(state(), "C")
+    assert (s.path, s.news) == (True, "recording the camera's path")
+    assert not press(s, "C").path
 
 
 def test_jitter_is_switched_from_what_it_is():

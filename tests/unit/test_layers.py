@@ -44,10 +44,10 @@ LAYERS = [
     layer("assets", "assets raytrace errors", OPENGL | EMBREE | WINDOWS),
     layer("raytrace", "raytrace config errors", OPENGL | WINDOWS),
     layer("gl", "gl raytrace.frame config parameter errors", EMBREE | WINDOWS),
-    layer("ui", "ui assets gl raytrace config parameter console errors images session", EMBREE),
+    layer("ui", "ui assets bench.judge gl raytrace config parameter console errors images session storage", EMBREE),
     layer(
         "bench",
-        "assets bench gl raytrace config parameter console errors session storage",
+        "assets bench gl raytrace config parameter console errors images session storage",
         OPENGL | WINDOWS | {"embreex"},
     ),
     layer(
@@ -55,6 +55,7 @@ LAYERS = [
         "assets bench cli config demo doctor errors explain gl headless raytrace ui",
         OPENGL | EMBREE | WINDOWS,
     ),
+    layer("bench/judge.py", "bench.metrics bench.metrics_visual raytrace.still", OPENGL | WINDOWS | EMBREE),
     layer("explain.py", "config parameter gl raytrace session ui.state", OPENGL | EMBREE | WINDOWS),
     layer("tools", "tools assets bench cli config parameter errors gl images raytrace session ui", WINDOWS),
 ]

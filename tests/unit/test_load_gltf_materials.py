@@ -106,7 +106,7 @@ def test_image_shared_by_materials_is_decoded_once_and_unused_ones_never(tmp_pat
     builder = GltfBuilder()
     first, second = builder.texture(png(RED_OVER_BLUE)), builder.texture(b"not an image")
     builder.json["textures"].append({"source": 0})
-    builder.add("materials", _base(first) | {"normalTexture": {"index": second}})
+    builder.add("materials", _base(first) | {"occlusionTexture": {"index": second}})
     builder.add("materials", _base(2))
     builder.node(mesh=builder.mesh(*(builder.primitive(uvs=UVS, material=k) for k in range(2))))
     scene = _load(builder, tmp_path)
@@ -160,21 +160,21 @@ def test_simplifications_are_counted_once_each(tmp_path: Path):
     texture = builder.texture(png(RED_OVER_BLUE))
     matte = {"metallicFactor": 0, "roughnessFactor": 1}
     materials: list[dict[str, Any]] = [
-        {},  # glTF's default is metallic
-        {"pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 0.4}},
-        {"pbrMetallicRoughness": matte, "normalTexture": {"index": texture}, "alphaMode": "MASK"},
+        {"occlusionTexture": {"index": texture}},
+        {"extensions": {"KHR_materials_pbrSpecularGlossiness": {}}},
+        {"pbrMetallicRoughness": matte, "alphaMode": "BLEND"},
         {"pbrMetallicRoughness": matte, "extensions": {"KHR_materials_transmission": {}, "KHR_materials_ior": {}}},
         {"pbrMetallicRoughness": matte | {"baseColorFactor": [1.5, -1, 0, 1]}, "alphaMode": "BLEND"},
         {"pbrMetallicRoughness": matte},
-        {"normalTexture": {"index": texture}},  # not used by any primitive
+        {"occlusionTexture": {"index": texture}},  # not used by any primitive
     ]
     for material in materials:
         builder.add("materials", material)
     builder.node(mesh=builder.mesh(*(builder.primitive(material=k) for k in range(6))))
     scene = _load(builder, tmp_path)
-    assert "2 metallic or glossy materials: drawn as diffuse with their base colour" in scene.notices
-    assert "1 material with a normal map: drawn without it" in scene.notices
-    assert "2 cut-out or blended materials (alphaMode): drawn opaque" in scene.notices
+    assert "1 material with an occlusion map: left out, the tracer finds occlusion itself" in scene.notices
+    assert "1 material with specular and glossiness, an old model: drawn as diffuse" in scene.notices
+    assert "2 blended materials (alphaMode): cut out where less than half there" in scene.notices
     assert "1 see-through material (transmission): drawn opaque" in scene.notices
     assert "1 material with KHR_materials_ior: drawn without it" in scene.notices
     assert "1 material with a base colour outside [0, 1]: clamped" in scene.notices
@@ -188,7 +188,83 @@ def test_texture_without_coordinates_and_two_layouts_are_named(tmp_path: Path):
     builder.texture(png(RED_OVER_BLUE))
     scene = _load(builder, tmp_path)
     assert any("without texture coordinates" in notice for notice in scene.notices)
-    assert any("emissive texture laid out differently" in notice for notice in scene.notices)
+    assert any("textures laid out differently" in notice for notice in scene.notices)
+
+
+def test_metallic_roughness_and_its_textures(tmp_path: Path):
+    """glTF 2.0, sec. 3.9.2: the defaults are a rough metal; roughness is green, metallic blue, both linear."""
+    builder = one_triangle(uvs=UVS, material=0)
+    shared = builder.texture(png(RED_OVER_BLUE))
+    gloss = {"index": shared}
+    builder.add(
+        "materials",
+        {
+            "pbrMetallicRoughness": {
+                "baseColorTexture": {"index": shared},
+                "roughnessFactor": 0.25,
+                "metallicRoughnessTexture": gloss,
+            },
+            "normalTexture": gloss | {"scale": 0.5},
+        },
+    )
+    scene = _load(builder, tmp_path)
+    material = scene.materials[0]
+    assert material.specular
+    assert (material.metallic, material.roughness, material.normal_scale) == (1.0, 0.25, 0.5)
+    assert material.metallic_roughness_texture == material.normal_texture != material.base_texture
+    assert scene.textures[material.normal_texture].linear
+    assert not scene.textures[material.base_texture].linear
+
+
+@pytest.mark.parametrize(
+    ("factors", "specular"),
+    [
+        ({}, True),
+        ({"metallicFactor": 0}, False),
+        ({"metallicFactor": 0, "roughnessFactor": 0.9}, True),
+        ({"metallicFactor": 0.1, "roughnessFactor": 1}, True),
+        ({"metallicFactor": 0, "metallicRoughnessTexture": {"index": 0}}, True),
+    ],
+)
+def test_what_is_rough_and_no_metal_is_diffuse(tmp_path: Path, factors: dict[str, Any], specular: bool):
+    builder = _textured({"pbrMetallicRoughness": factors})
+    builder.texture(png(RED_OVER_BLUE))
+    assert _load(builder, tmp_path).materials[0].specular is specular
+
+
+def test_alpha_mode_and_coverage(tmp_path: Path):
+    """The texture's alpha is kept where it cuts something out, and only there."""
+    holes = np.dstack([RED_OVER_BLUE, np.array([[255] * 3, [0, 100, 200]], np.uint8)])
+    builder = GltfBuilder()
+    builder.texture(png(holes))
+    base = _base()["pbrMetallicRoughness"] | {"baseColorFactor": [1, 1, 1, 0.75]}
+    modes: list[dict[str, Any]] = [{}, {"alphaMode": "MASK"}, {"alphaMode": "MASK", "alphaCutoff": 0.3}]
+    for mode in [*modes, {"alphaMode": "BLEND"}]:
+        builder.add("materials", {"pbrMetallicRoughness": base} | mode)
+    builder.node(mesh=builder.mesh(*(builder.primitive(uvs=UVS, material=k) for k in range(4))))
+    scene = _load(builder, tmp_path)
+    assert [m.alpha_cutoff for m in scene.materials] == [None, 0.5, 0.3, 0.5]
+    assert {m.alpha for m in scene.materials} == {0.75}
+    opaque, cut = (scene.textures[m.base_texture] for m in scene.materials[:2])
+    assert opaque.alpha is None
+    assert cut.alpha is not None
+    np.testing.assert_array_equal(cut.alpha, holes[::-1, :, 3])
+    np.testing.assert_array_equal(cut.pixels, opaque.pixels)
+
+
+def test_vertex_colors_are_read_in_every_form(tmp_path: Path):
+    builder = GltfBuilder()
+    colors = np.array([(0.2, 0.4, 0.6, 0.8), (1.0, 0.0, 0.6, 0.4), (0.0, 0.2, 1.0, 1.0)])
+    plain, rgb = builder.primitive(), builder.primitive()
+    stored = [builder.primitive(), rgb, plain]
+    stored[0]["attributes"]["COLOR_0"] = builder.accessor(np.rint(colors * 255), "u1", normalized=True)
+    rgb["attributes"]["COLOR_0"] = builder.accessor(colors[:, :3])
+    builder.node(mesh=builder.mesh(*stored))
+    mesh = _load(builder, tmp_path).meshes[0]
+    assert mesh.colors is not None
+    assert mesh.colors.dtype == np.float32
+    opaque = np.column_stack([colors[:, :3], np.ones(3)])
+    np.testing.assert_allclose(mesh.colors, np.concatenate([colors, opaque, np.ones((3, 4))]), atol=1e-6)
 
 
 def test_no_material_is_light_grey(tmp_path: Path):

@@ -17,9 +17,10 @@ from PIL import Image
 import app
 import cli
 import config
+from bench.files import write_json
 from bench.machine import describe
-from bench.methods import MethodResult, QualityResult
-from bench.report import Report, write_json
+from bench.results import QualityResult, Report
+from bench.running import MethodResult
 from bench.timing import Summary
 from bench.tracing import TracingResult
 from errors import UserError

@@ -118,6 +118,17 @@ def test_an_installation_that_brings_nothing_is_an_error(machine):
         setup.provide(list(GL), FakeMachine([EGL_LIBRARY.name], **machine))
 
 
+def test_a_browser_is_welcome_but_nothing_fails_without_one(capsys):
+    machine = FakeMachine(["chromium", "chromedriver"])
+    setup.offer(setup.PAGE_TESTS, machine)
+    assert machine.commands[0].endswith(" chromium chromium-driver")
+    assert "without" not in capsys.readouterr().out
+    setup.offer(setup.PAGE_TESTS, machine)
+    assert len(machine.commands) == 1
+    setup.offer(setup.PAGE_TESTS, FakeMachine(["chromedriver"], failing=["apt-get"]))
+    assert "without chromedriver some tests are skipped: apt-get update && " in capsys.readouterr().out
+
+
 def test_a_missing_driver_is_installed_or_named():
     machine = FakeMachine([EGL_DRIVER.name])
     setup.provide_driver(machine)
@@ -261,6 +272,6 @@ def _seconds(*arguments: str) -> float:
 
 
 def test_every_requirement_is_pinned_and_no_index_is_named():
-    for name in setup.REQUIREMENTS["test"]:
+    for name in (*setup.REQUIREMENTS["test"], "requirements-compare.txt"):
         for line in (ROOT / name).read_text().splitlines():
             assert re.fullmatch(r"#.*|[A-Za-z0-9_]+==[0-9a-z.]+", line), f"{name}: {line}"

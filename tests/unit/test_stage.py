@@ -25,6 +25,10 @@ class Notes:
     def __init__(self) -> None:
         self.frames: list[SimpleNamespace] = []
         self.closed = False
+        self.positions = False
+
+    def carry_positions(self, wanted: bool) -> None:
+        self.positions = wanted
 
     def frame(
         self, index: int, camera: Camera, previous: Camera, size: Any, now: float, before: float, cut: bool, **how: Any
@@ -42,7 +46,7 @@ def stage() -> Iterator[Stage]:
     def camera(frame: int) -> Camera:
         return Camera((float(frame), 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0), 1.0)
 
-    scene = SimpleNamespace(scene=SimpleNamespace(name="room"), extent=8.0)
+    scene = SimpleNamespace(scene=SimpleNamespace(name="room", dims=False), extent=8.0, moves=True)
     shot: Any = SimpleNamespace(scene=scene, camera=camera, tracer=Notes())
     made = Stage(shot, True, lambda: None)
     yield made

@@ -104,6 +104,9 @@ def test_what_the_method_does_not_have_is_none():
         ("firefly", "mode", "clamp"),
         ("svgf", "color_clamp", True),
         ("bmfr", "round_history", False),
+        ("spatial", "temporal", False),
+        ("gaussian", "separable", False),
+        ("atrous", "iterations", 2),
     ],
 )
 def test_a_section_is_used_exactly_if_the_plan_depends_on_it(denoiser, section, key, other):

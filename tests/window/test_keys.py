@@ -4,13 +4,18 @@ screen, or in the passes that the frame runs through.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import assets
+from bench.recording.sequence import open_sequence
+from raytrace.camera_path import read_keyframes
+from raytrace.shot import FPS
 from tests.window.desktop import F32, START_SECONDS, STILL, App, application, difference, plan, roughness, wait_for
 from ui.keys import BINDINGS, Binding
 
@@ -267,6 +272,20 @@ def screenshot(app: App) -> None:
     assert f"\n{name}\n" in app.stdout()
 
 
+def camera_path(app: App) -> None:
+    app.ask("c", "recording the camera's path")
+    app.hold("d", 0.4)
+    name = app.ask("c", r"^frame \d+: saved (.*camera_\d+\.toml)$")[1]
+    keys, _ = read_keyframes(Path(name))
+    assert len(keys) >= 2
+    assert [key.time for key in keys] == [index / FPS for index in range(len(keys))]
+    first, last = keys[0].camera, keys[-1].camera
+    assert first == assets.build("cornell").camera
+    way = np.array(last.position) - first.position
+    assert way @ first.basis()[0] > 0.1
+    assert f"\n{name}\n" in app.stdout()
+
+
 def let_go(app: App) -> None:
     """While the mouse turns the camera; a later test has the other meaning of Escape."""
     app.xdotool("mousemove", "--window", app.window, 320, 100, "mousedown", 3, "sleep", 0.3)
@@ -305,6 +324,34 @@ def fast(app: App) -> None:
     assert start - place(app.settled())[0] > 1.5 * slow > 0.0
 
 
+def recording(app: App) -> None:
+    """The frames shown, in their size and in order, from the key to the key."""
+    folder = Path(app.ask("F11", r"recording to (\S+)$")[1])
+    wait_for(lambda: (folder / "world_position3.exr").exists(), "four recorded frames")
+    told = app.ask("F11", r"recorded (\d+) frames to (\S+)$")
+    app.hear(rf"^{re.escape(str(folder))}$")
+    sequence = open_sequence(folder)
+    assert (sequence.frames, str(folder)) == (int(told[1]), told[2])
+    assert sequence.size == (160, 90)
+    assert sequence.notes["about"]["scene"] == "cornell"
+    first, last = sequence.packet(0), sequence.packet(sequence.frames - 1)
+    assert not np.array_equal(first.direct, last.direct)
+    assert (last.motion[..., :2] == 0.0).all()  # the camera is at rest
+    assert first.jitter != last.jitter  # but for what the anti-aliasing wants
+    since = len(app.stdout())
+    app.press("0")
+    app.hear("noisy frame", since)
+    assert not (folder / f"color{sequence.frames}.exr").exists()
+
+
+def error_map(app: App) -> None:
+    before = app.settled()
+    app.ask("m", "error map on$")
+    wait_for(lambda: difference(before, app.picture()) > 0.05, "the map of the errors instead of the picture")
+    app.ask("m", "error map off$")
+    wait_for(lambda: difference(before, app.picture()) < 2 * STILL, "the picture again")
+
+
 CHECKS: dict[str, Callable[[App], None]] = {
     "0": method("0", "none"),
     "1": method("1", "svgf"),
@@ -331,15 +378,18 @@ CHECKS: dict[str, Callable[[App], None]] = {
     "PERIOD": single_step,
     "N": next_scene,
     "R": camera_home,
+    "C": camera_path,
     "H": history,
     "B": next_texture,
     "V": texture_before,
     "X": split,
     "I": overlay("i", "inspect"),
+    "M": error_map,
     "EQUAL": resolution("equal", "minus", (213, 120)),
     "MINUS": resolution("minus", "equal", (120, 68)),
     "G": overlay("g", "hud"),
     "K": overlay("k", "help"),
+    "F11": recording,
     "F12": screenshot,
     "ESCAPE": let_go,
     "W": flight("w", moved=2, sign=1),

@@ -51,7 +51,7 @@ class Player:
 
     def press_at_random(self, seed: int) -> None:
         """:data:`HALF` keys, any but Esc, which ends the program; not often those that write files or open scenes."""
-        seldom = (Action.SCREENSHOT, Action.NEXT_SCENE)
+        seldom = (Action.SCREENSHOT, Action.RECORD, Action.NEXT_SCENE)
         names = [binding.key for binding in BINDINGS if binding.action is not Action.BACK]
         weights = [0.3 if BY_KEY[name].action in seldom else 1.0 for name in names]
         keys = random.Random(seed).choices(names, weights, k=HALF)

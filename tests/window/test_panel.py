@@ -286,6 +286,17 @@ def test_scenes_are_chosen_from_a_list(hand):
     assert hand.state.scene == "", "the one shown is not opened again"
 
 
+def test_methods_are_chosen_from_a_list(hand):
+    """Also those that have no key."""
+    hand.click("##method")
+    assert set(DENOISERS) - {"reference"} <= set(hand.boxes)
+    hand.click("joint-separable")
+    assert (hand.state.denoiser, hand.state.before) == ("joint-separable", "svgf")
+    hand.draw(2)
+    assert {"##joint.sigma_d", "##spatial.order"} <= set(hand.boxes)
+    assert "##gaussian.sigma_d" not in hand.boxes
+
+
 def test_textures_are_chosen_from_a_list(hand):
     hand.state.textures = ("frame.direct", "svgf.reproject.out_guide")
     hand.draw()
@@ -305,6 +316,7 @@ def test_textures_are_chosen_from_a_list(hand):
         (Action.RESET_HISTORY, "reset", "by key"),
         (Action.RESET_CAMERA, "home", True),
         (Action.SCREENSHOT, "screenshot", True),
+        (Action.RECORD, "recording", True),
     ],
 )
 def test_buttons_do_what_their_keys_do(hand, action, field, value):

@@ -7,10 +7,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
+import assets
 from gl.renderer import read
+from raytrace.camera_path import read_camera_path
+from raytrace.shot import FPS
 from ui.glfw_window import first_size
 from ui.present import Presenter, letterbox
-from ui.screenshot import save_screenshot
+from ui.screenshot import save_path, save_screenshot
 from ui.title import Pace, Title
 
 
@@ -102,6 +105,21 @@ def test_a_screenshot_that_cannot_be_written_is_told(tmp_path, capsys):
     news = save_screenshot(tmp_path / "file", np.zeros((2, 3, 3), np.uint8))
     assert "cannot be written" in news
     assert "cannot be written" in capsys.readouterr().err
+
+
+def test_a_recorded_path_is_replayed_to_the_bit(tmp_path):
+    """In frames that were seldom begun a thirtieth of a second apart: what counts is their number."""
+    scene = assets.build("cornell")
+    assert scene.flight is not None
+    cameras = [scene.flight(0.37 * index) for index in range(9)]
+    assert save_path(tmp_path, cameras, "cornell") == f"saved {tmp_path / 'camera_000.toml'}"
+    path = read_camera_path(tmp_path / "camera_000.toml")
+    assert callable(path)
+    for index, camera in enumerate(cameras):
+        again = path(index / FPS)
+        assert again.position == camera.position
+        assert np.allclose(again.forward, camera.forward, rtol=0, atol=1e-15)
+        assert again.yfov == pytest.approx(camera.yfov, rel=1e-15)
 
 
 def test_two_pictures_share_the_window_at_a_column(ctx, presenter):

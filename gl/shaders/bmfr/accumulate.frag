@@ -1,7 +1,8 @@
 // Blend this frame's sample with the history of the same surface. Koskela et al. 2019, preprocessing.
 //
 // Reprojection and blending in one: both read the same texels. bmfr/accumulate_fit.frag blends by the same decisions.
-// ADAPTIVE: where light has changed, the history follows it and counts for less (Schied et al. 2018).
+// ADAPTIVE: where light has changed, the history follows it and counts for less (Schied et al. 2018). IN_PLACE: the point is
+// looked for where it is now, as if only the camera had moved.
 
 #include "common/finite.glsl"
 #include "common/octahedral.glsl"
@@ -27,6 +28,10 @@ uniform float u_alpha;
 uniform float u_max_history;
 uniform float u_position_tolerance;
 uniform float u_normal_tolerance;
+#ifdef IN_PLACE
+uniform mat3 u_turn;
+uniform vec3 u_step;
+#endif
 
 layout(location = 0) out vec4 out_color;        // rgb, samples in it
 layout(location = 1) out vec4 out_reprojection; // place in the last frame, mask of valid taps, history length
@@ -60,6 +65,11 @@ void main() {
     bool hit = motion.w >= 0.0;
 
     vec2 lattice = vec2(p) + motion.xy * vec2(size);
+#ifdef IN_PLACE
+    vec3 now = u_turn * view_position(vec2(p), surface.w) + u_step;
+    motion.z = now.z;
+    lattice = now.xy / (u_pixel_size * now.z) + 0.5 * vec2(size) - 0.5;
+#endif
     bool seen = u_history_valid && hit && is_finite(motion) && is_finite(surface) && is_finite(normal) &&
                 motion.z > 0.0 && all(greaterThan(lattice, vec2(-1.0))) && all(lessThan(lattice, vec2(size)));
     vec3 color = vec3(0.0);

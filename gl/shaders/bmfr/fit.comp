@@ -2,11 +2,13 @@
 //
 // One work group per block of GROUP_X x GROUP_Y pixels. X_AT: place of feature X's first component in a row; what is not
 // in the list of features is neither computed nor read. NOISE: stochastic regularisation. UNIT: scale to [0, 1]. PARTS: of
-// the block, PART pixels wide, that are fitted again; not defined if there are none.
+// the block, PART pixels wide, that are fitted again; not defined if there are none. FRESH: of fewer frames a part is judged
+// by another caution; not defined if of none.
 
 layout(local_size_x = THREADS) in;
 
 #include "common/finite.glsl"
+#include "common/hash.glsl"
 #include "bmfr/solver.glsl"
 #include "bmfr/parts.glsl"
 
@@ -15,6 +17,9 @@ uniform sampler2D in_surface; // normal, depth
 #if HAS_IN_ALBEDO
 uniform sampler2D in_albedo;
 #endif
+#ifdef ROUGHNESS_AT
+uniform sampler2D in_roughness;
+#endif
 uniform mat3 u_view;   // from pixels at depth 1, depth to world space
 uniform vec2 u_jitter; // of the camera rays, pixels
 uniform ivec2 u_offset;
@@ -22,6 +27,7 @@ uniform uint u_seed;
 uniform float u_noise;
 uniform float u_rank_tolerance;
 uniform float u_caution;
+uniform float u_fresh_caution;
 
 layout(rgba16f, binding = 0) writeonly uniform image2D out_color;
 
@@ -45,6 +51,7 @@ ivec2 size;
 ivec2 corner; // of the block
 vec4 origin, scale;
 vec3 middle_normal, middle_albedo;
+float middle_roughness;
 
 ivec2 pixel_of(int element) { return corner + ivec2(element % GROUP_X, element / GROUP_X); }
 
@@ -129,13 +136,10 @@ void write_features(ivec2 p, vec4 surface, vec4 place) {
     albedo = is_finite(albedo) ? albedo - middle_albedo : vec3(0.0);
     row[ALBEDO_AT] = albedo.r, row[ALBEDO_AT + 1] = albedo.g, row[ALBEDO_AT + 2] = albedo.b;
 #endif
-}
-
-// Finalizer of Wellons, "lowbias32".
-uint hash(uint x) {
-    x = (x ^ (x >> 16)) * 0x7feb352du;
-    x = (x ^ (x >> 15)) * 0x846ca68bu;
-    return x ^ (x >> 16);
+#ifdef ROUGHNESS_AT
+    float roughness = texelFetch(in_roughness, p, 0).a;
+    row[ROUGHNESS_AT] = is_finite(vec3(roughness)) ? roughness - middle_roughness : 0.0;
+#endif
 }
 
 uint state; // of the noise
@@ -164,6 +168,9 @@ void fold_pixel(int element, uint seed) {
     bool counts = is_surface(surface, place) && color.a > 0.0;
     EACH(SELECT)
     for (int k = FEATURES; k < COLUMNS; ++k) row[k] = counts ? row[k] : 0.0;
+#ifdef FRESH
+    age += counts ? color.a : 0.0;
+#endif
     fold_row();
 }
 
@@ -223,12 +230,16 @@ void main() {
     vec3 albedo = texelFetch(in_albedo, middle, 0).rgb;
     middle_albedo = is_finite(albedo) ? albedo : vec3(0.0);
 #endif
+#ifdef ROUGHNESS_AT
+    float roughness = texelFetch(in_roughness, middle, 0).a;
+    middle_roughness = is_finite(vec3(roughness)) ? roughness : 0.0;
+#endif
     fold_block(thread);
     merge_triangles(thread);
     if (thread == 0) solve(u_rank_tolerance);
     barrier();
 #if PARTS
-    for (int part = thread; part < PARTS; part += THREADS) solve_part(part, u_rank_tolerance, u_caution);
+    for (int part = thread; part < PARTS; part += THREADS) solve_part(part, u_rank_tolerance, u_caution, u_fresh_caution);
     barrier();
 #endif
     for (int piece = thread % PIECES; piece < PIECES; piece += THREADS) write_piece(piece, thread / PIECES);

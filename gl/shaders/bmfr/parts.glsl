@@ -54,13 +54,16 @@ void substitute(const int k) {
 
 // Weights of a part, in s_weights behind the block's and those of the parts before; by one invocation after solve().
 // `caution`: 1 expects of noise to explain its variance in each feature; neighbouring samples that share a history, and
-// are alike for that reason, explain more.
-void solve_part(int part, float tolerance, float caution) {
+// are alike for that reason, explain more. `fresh`: the caution where the samples are means of fewer than FRESH frames.
+void solve_part(int part, float tolerance, float caution, float fresh) {
     int slot = LANES + part, first = FEATURES * (1 + part);
     EACH(LOAD)
     EACH(LOAD_BLOCK)
     EACH(SUBTRACT) // before columns are dropped, of which the block's weights are not 0
     rest = s_rest[slot];
+#ifdef FRESH
+    age = s_age[slot];
+#endif
 #if !NOISE // which leaves no column that depends on others
     share_triangle(slot);
     drop_dependent(slot, tolerance);
@@ -69,6 +72,9 @@ void solve_part(int part, float tolerance, float caution) {
     gain = used = 0.0;
     EACH(COUNT)
     float samples = floor(triangle[entry(0, 0)] * triangle[entry(0, 0)] + 0.5); // feature 0 is the constant
+#ifdef FRESH
+    caution = age < float(FRESH) * samples ? fresh : caution;
+#endif
     float freedom = samples - used;
     bool enough = freedom > used && gain > 0.0;
     float share = enough ? max(1.0 - caution * used * rest / (freedom * gain), 0.0) : 0.0;

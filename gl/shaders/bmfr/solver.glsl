@@ -50,6 +50,10 @@ shared vec3 s_weights[FEATURES * (1 + PARTS)]; // first the block's
 #if PARTS
 float rest; // squares of the colours, summed up, that no weights can explain in the rows of `triangle`
 shared float s_rest[SLOTS];
+float age = 0.0; // frames in the samples, summed up; of use with FRESH only
+#ifdef FRESH
+shared float s_age[SLOTS];
+#endif
 #endif
 
 void clear_row(const int k) {
@@ -60,7 +64,7 @@ void clear_row(const int k) {
 void clear_triangle() {
     EACH(CLEAR)
 #if PARTS
-    rest = 0.0;
+    rest = age = 0.0;
 #endif
 }
 
@@ -97,6 +101,9 @@ void share_triangle(int slot) {
     EACH(SHARE)
 #if PARTS
     s_rest[slot] = rest;
+#ifdef FRESH
+    s_age[slot] = age;
+#endif
 #endif
 }
 
@@ -108,6 +115,9 @@ void fold_triangle(int slot, int count) {
     }
 #if PARTS
     rest += count > 0 ? s_rest[slot] : 0.0;
+#ifdef FRESH
+    age += count > 0 ? s_age[slot] : 0.0;
+#endif
 #endif
 }
 

@@ -7,6 +7,10 @@ uniform sampler2D in_indirect;
 #if HAS_IN_ALBEDO
 uniform sampler2D in_albedo;
 #endif
+#ifdef GLOSSY
+uniform sampler2D in_specular;
+uniform sampler2D in_specular_albedo;
+#endif
 
 layout(location = 0) out vec4 out_color;
 
@@ -19,6 +23,9 @@ void main() {
 #endif
 #if HAS_IN_ALBEDO
     c *= texelFetch(in_albedo, p, 0).rgb;
+#endif
+#ifdef GLOSSY
+    c += texelFetch(in_specular, p, 0).rgb * texelFetch(in_specular_albedo, p, 0).rgb;
 #endif
     out_color = vec4(c, direct.a);
 }

@@ -11,6 +11,9 @@ uniform sampler2D in_radiance;
 uniform sampler2D in_direct;
 uniform sampler2D in_indirect;
 #endif
+#ifdef GLOSSY
+uniform sampler2D in_specular;
+#endif
 
 layout(rg32ui, binding = 0) writeonly uniform uimage2D out_count;
 layout(rgba16f, binding = 1) writeonly uniform image2D out_color;
@@ -26,7 +29,11 @@ void main() {
     for (; p.y < end; ++p.y) {
         vec4 color = texelFetch(in_color, p, 0);
 #if HAS_IN_DIRECT
-        if (!is_finite(texelFetch(in_direct, p, 0).rgb) || !is_finite(texelFetch(in_indirect, p, 0).rgb)) {
+        bool sound = is_finite(texelFetch(in_direct, p, 0).rgb) && is_finite(texelFetch(in_indirect, p, 0).rgb);
+#ifdef GLOSSY
+        sound = sound && is_finite(texelFetch(in_specular, p, 0).rgb);
+#endif
+        if (!sound) {
             color = vec4(0.2, 0.0, 0.0, 1.0);
             ++count.x;
         }

@@ -2,6 +2,7 @@
 //
 // STEP: distance of the taps. SIGMA_N_SQUARINGS: log2 of the normal exponent, or -1 where it is no power of two.
 // LUMINANCE_STOP: 0 leaves out w_l. RAW: in_color is a sample that no pass has looked at yet.
+// GLOSSY: specular light, of surfaces of like roughness.
 // The taps are written out, so that constants fold.
 
 #include "common/color.glsl"
@@ -12,6 +13,11 @@ uniform sampler2D in_surface; // normal, depth
 uniform sampler2D in_gradient;
 #if HAS_IN_REPROJECTION
 uniform sampler2D in_reprojection; // w: history length before this frame
+#endif
+#ifdef GLOSSY
+uniform sampler2D in_specular_albedo; // a: roughness
+uniform float u_sigma_r;
+uniform float u_reach;
 #endif
 uniform float u_accumulated_variance;
 uniform float u_sigma_z;
@@ -29,11 +35,15 @@ vec2 gradient;
 float l, inverse_l, floor_z;
 vec3 color;
 float weight, variance;
+#ifdef GLOSSY
+float roughness, inverse_r, inverse_reach;
+#endif
 
 vec4 color_at(ivec2 q) {
     vec4 c = texelFetch(in_color, q, 0);
 #if RAW
-    c = is_finite(c.rgb) ? vec4(clamp_radiance(c.rgb), 0.0) : vec4(0.0);
+    // Below 0: there is no sample.
+    c = is_finite(c.rgb) ? vec4(clamp_radiance(c.rgb), 0.0) : vec4(vec3(0.0), -1.0);
 #endif
     return c;
 }
@@ -58,8 +68,18 @@ void tap(ivec2 offset, float kernel, float inverse_z) {
 #if LUMINANCE_STOP
     e += abs(l - luminance(c.rgb)) * inverse_l;
 #endif
+#ifdef GLOSSY
+    vec4 gloss = texelFetch(in_specular_albedo, q, 0);
+    e += abs(roughness - gloss.a) * inverse_r + length(vec2(offset)) * inverse_reach;
+#endif
     float w = kernel * normal_weight(s.xyz) * exp2(-e);
+#ifdef GLOSSY
+    w = gloss.r + gloss.g + gloss.b > 0.0 ? w : 0.0; // where nothing shines there is no light to tell of
+#endif
     w = inside ? sane_weight(w) : 0.0;
+#if RAW
+    w = c.a < 0.0 ? 0.0 : w;
+#endif
     color += w * c.rgb;
     variance += (w * c.a) * (w * c.a);
     weight += w;
@@ -83,6 +103,11 @@ void main() {
     gradient = texelFetch(in_gradient, p, 0).xy;
     floor_z = 0.1 * u_pixel_size * surface.w;
     l = luminance(centre.rgb);
+#ifdef GLOSSY
+    roughness = texelFetch(in_specular_albedo, p, 0).a;
+    inverse_r = LOG2_E / u_sigma_r;
+    inverse_reach = LOG2_E / (u_reach * roughness * roughness + 0.1);
+#endif
 
 #if LUMINANCE_STOP
     // Variance blurred by a 3x3 Gaussian, for w_l only: a single estimate is too noisy to steer by.
@@ -100,6 +125,10 @@ void main() {
     color = centre.rgb;
     variance = centre.a * centre.a;
     weight = 1.0;
+#if RAW
+    // What is around a missing sample decides, if there is anything.
+    if (centre.a < 0.0) weight = 1e-20, variance = 0.0;
+#endif
     pair(1, 0, A);      pair(0, 1, A);
     pair(1, 1, A * A);  pair(1, -1, A * A);
     pair(2, 0, B);      pair(0, 2, B);

@@ -4,7 +4,8 @@
 // CLAMPED: the history's colour is first brought within the bounds of temporal/neighbourhood.frag. ADAPTIVE: where
 // light has changed, the history follows it and counts for less (Schied et al. 2018, sec. 4.4); SIGNAL: which channel
 // of λ tells it; POWER: its length becomes N (1 - λ)^u_power, otherwise that of a mean in which the new sample has the
-// weight it gets.
+// weight it gets. CENTRED: the second moment is that about the mean (Welford 1962). UNBIASED: h / (h - 1) of it is the
+// variance, Bessel's correction.
 
 #include "common/color.glsl"
 #include "common/finite.glsl"
@@ -35,6 +36,7 @@ layout(location = 1) out vec2 out_moments;
 
 vec3 color = vec3(0.0);
 vec2 moments = vec2(0.0);
+float origin = 0.0; // what the first moment is relative to
 float total = 0.0;
 
 void gather(ivec2 tap, float w) {
@@ -48,6 +50,12 @@ void gather(ivec2 tap, float w) {
     bool sound = is_finite(c) && is_finite(m);
 #endif
     if (sound) {
+#ifdef CENTRED
+        // The variance of texels put together is theirs and that of their means.
+        if (total == 0.0) origin = m.x;
+        m.x -= origin;
+        m.y += m.x * m.x;
+#endif
         color += w * c;
         moments += w * m;
         total += w;
@@ -57,13 +65,23 @@ void gather(ivec2 tap, float w) {
     }
 }
 
+// A sample's luminance `l` comes to moments of which it gets the share `a`.
+vec2 blend_moments(vec2 m, float l, float a) {
+#ifdef CENTRED
+    float d = l - m.x;
+    return vec2(m.x + a * d, (1.0 - a) * (m.y + a * d * d));
+#else
+    return mix(m, vec2(l, l * l), a);
+#endif
+}
+
 void main() {
     ivec2 p = ivec2(gl_FragCoord.xy);
     vec3 c = texelFetch(in_color, p, 0).rgb;
     bool usable = is_finite(c);
     c = usable ? clamp_radiance(c) : vec3(0.0); // clamped before it is squared
     float l = luminance(c);
-    vec2 m = vec2(l, l * l);
+    vec2 m = blend_moments(vec2(l, 0.0), l, 1.0);
 
     vec4 found = texelFetch(in_reprojection, p, 0);
     int mask = u_history_valid ? int(max(found.z, 0.0)) : 0; // below 0 it says why there is none
@@ -90,6 +108,9 @@ void main() {
 #endif
         // A plain running mean until the new sample's share has fallen to alpha, exponential from then on.
         n = found.w;
+#ifdef CENTRED
+        moments = vec2(origin + moments.x, max(moments.y - moments.x * moments.x, 0.0));
+#endif
 #ifdef ADAPTIVE
         n *= left / total;
         vec4 change = texelFetch(in_lambda, p, 0);
@@ -106,9 +127,17 @@ void main() {
 #endif
         float share = 1.0 / (n + 1.0);
         c = usable ? mix(color, c, news * mix(max(share, u_alpha), 1.0, void_share)) : color;
-        m = usable ? mix(moments, m, news * mix(max(share, u_alpha_moments), 1.0, void_share)) : moments;
+        m = usable ? blend_moments(moments, l, news * mix(max(share, u_alpha_moments), 1.0, void_share)) : moments;
     }
-    out_color = vec4(c, sqrt(max(m.y - m.x * m.x, 0.0))); // the difference may round below zero
+#ifdef CENTRED
+    float variance = m.y;
+#else
+    float variance = max(m.y - m.x * m.x, 0.0); // the difference may round below zero
+#endif
+#ifdef UNBIASED
+    variance *= (n + 1.0) / max(n, 1.0); // one sample has none
+#endif
+    out_color = vec4(c, sqrt(variance));
 #if HALF
     out_color = round_to_half(out_color);
 #endif
