@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from contextlib import nullcontext
+from dataclasses import replace
 
 import moderngl
 import numpy as np
@@ -58,6 +59,10 @@ class Renderer:
         """
         plan = self.plan(packet, config, denoiser, keep, split)
         reset = reset or self._discontinuity(packet)
+        if (packet.scene_id, packet.index) == (self._scene_id, self._index):
+            packet = replace(
+                packet, temporal_gradient=None
+            )  # filtered again: histories have followed its light already
         with profiler.frame() if profiler else nullcontext():
             with profiler.measure("upload") if profiler else nullcontext():
                 self._uploader.upload(packet, (tex.name for tex in plan.imports))

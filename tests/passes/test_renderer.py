@@ -9,7 +9,7 @@ import moderngl
 import numpy as np
 import pytest
 
-from config import Config
+from config import Asvgf, Config
 from gl.graph import GraphError
 from gl.profiler import Profiler
 from gl.renderer import Renderer, read
@@ -56,6 +56,18 @@ def test_a_cut_shows_the_frame_as_if_it_were_the_first(renderer: Renderer) -> No
         assert not np.array_equal(read(renderer.run(other, Config(), "svgf").outputs["display"]), first)
     after = read(renderer.run(replace(PACKET, cut=True), Config(), "svgf").outputs["display"])
     np.testing.assert_array_equal(after, first)
+
+
+def test_a_frame_that_is_filtered_again_is_not_followed_again(renderer: Renderer) -> None:
+    """Half of the light went with it: the histories are halved once, however often it is shown."""
+    half = np.tile(np.array([-0.5, 1, -0.5, 1], np.float32), (4, 6, 1))
+    config = Config(asvgf=Asvgf(gain=0.0, alpha=0.0))
+    lit = replace(frame(SIZE, direct=1.0), scene_id=1)
+    dimmed = replace(lit, index=1, direct=frame(SIZE, direct=0.5).direct, temporal_gradient=half)
+    renderer.run(lit, config, "asvgf")
+    for packet in (dimmed, dimmed, dimmed, replace(dimmed, index=2, temporal_gradient=None)):
+        radiance = read(renderer.run(packet, config, "asvgf").outputs["radiance"])
+        np.testing.assert_allclose(radiance[..., :3], 0.5, rtol=2e-3)
 
 
 def test_equal_frames_give_equal_pictures(ctx: moderngl.Context) -> None:
