@@ -118,7 +118,7 @@ class Svgf(Section):
     first_sigma_l: float = param(4.0, 0.1, 1000, "[0.1;1000] sigma_l of the first iteration, in sigma_l of the others")
     sigma_r: float = param(0.1, 0.001, 100, "[0.001;100] tolerance for roughness, of specular light only")
     reach: float = param(
-        30.0, 1, 1e6, "[1;1000000] distance over which specular light is averaged, pixels per squared roughness"
+        15.0, 1, 1e6, "[1;1000000] distance over which specular light is averaged, pixels per squared roughness"
     )
 
     @property
@@ -171,7 +171,7 @@ class Bmfr(Section):
     preset: str = param(
         "best", choices=("paper", "reference", "best"), doc="values for the keys of this section that are not set"
     )
-    separate: bool = param(True, doc="fit diffuse and specular light apart", structural=True)
+    separate: bool = param(False, doc="fit diffuse and specular light apart", structural=True)
     demodulate: bool = param(True, doc="fit illumination, without the surfaces' albedo", structural=True)
     temporal: bool = param(True, doc="accumulate over time, samples and fits", structural=True, heading="accumulation")
     max_history: int = param(255, 10, 255, "[10;255] longest history counted, in frames")

@@ -76,7 +76,7 @@ CASES: dict[str, tuple[Config, str, FrameTraits]] = {
     "asvgf_glossy": (Config(), "asvgf", GLOSSY),
     "joint_glossy": (Config(), "joint", GLOSSY),
     "bmfr_glossy": (load(None, ('bmfr.features="1,n,w,roughness"',)), "bmfr", GLOSSY),
-    "bmfr_glossy_joint": (load(None, ("bmfr.separate=false",)), "bmfr", GLOSSY),
+    "bmfr_glossy_apart": (load(None, ("bmfr.separate=true",)), "bmfr", GLOSSY),
     "bmfr_glossy_without_demodulation": (load(None, ("bmfr.demodulate=false",)), "bmfr", GLOSSY),
     "svgf_moving": (Config(), "svgf", FrameTraits(moving=True)),
     "svgf_growing": (svgf(normal_history=128), "svgf", FrameTraits()),
