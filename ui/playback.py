@@ -31,6 +31,7 @@ _CAMERA: Final = "recorded frames: the camera goes as it went"
 _REFUSALS: Final = {
     Action.FLY: _CAMERA,
     Action.RESET_CAMERA: _CAMERA,
+    Action.PATH: _CAMERA,
     Action.JITTER: "recorded frames: the jitter is what it was",
     Action.RESOLUTION: "recorded frames: they have one size",
     Action.RECORD: "these frames are recorded already",
