@@ -15,6 +15,7 @@ test: lint  ## lint, types, every test
 bench:      ## the measured table of the README
 	@$(PYTHON) tools/setup.py run
 	$(VENV) app.py bench --table $(ARGS)
+	$(VENV) -m bench.features
 
 report:     ## the same as a page with diagrams and pictures: out/bench.html; ARGS="--quick" for a look
 	@$(PYTHON) tools/setup.py run

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from assets.shapes import Shape, join
 from assets.textures import Pixels
@@ -33,9 +34,9 @@ class Stage:
         self._textures: list[Texture] = []
         self._meshes: list[Mesh] = []
 
-    def texture(self, name: str, pixels: Pixels) -> int:
-        """Add an image; returns its index."""
-        self._textures.append(Texture(name, pixels))
+    def texture(self, name: str, pixels: Pixels, alpha: NDArray[np.uint8] | None = None) -> int:
+        """Add an image, ``alpha`` (h, w) being its coverage; returns its index."""
+        self._textures.append(Texture(name, pixels, alpha=alpha))
         return len(self._textures) - 1
 
     def material(
@@ -46,17 +47,19 @@ class Stage:
         emission: Colour = (0.0, 0.0, 0.0),
         roughness: float | None = None,
         metallic: float = 0.0,
+        cutoff: float | None = None,
     ) -> None:
         """Add a material under a name of its own. ``color`` is linear and multiplies the texture.
 
-        Without a ``roughness`` it is diffuse, with one glossy, or a metal.
+        Without a ``roughness`` it is diffuse, with one glossy, or a metal. With a ``cutoff`` it has holes where the
+        texture's coverage is below.
         """
         if name in self._materials:
             raise ValueError(f"there is a material {name!r} already")
         material = Material(name, color, texture, emission)
         if roughness is not None:
             material = replace(material, specular=True, roughness=roughness, metallic=metallic)
-        self._materials[name] = material
+        self._materials[name] = material if cutoff is None else replace(material, alpha_cutoff=cutoff)
 
     def add(self, name: str, parts: list[Part], motion: Motion | None = None) -> None:
         """Add one object. With ``motion`` its shapes are in the object's own space, otherwise in the world's."""

@@ -205,3 +205,22 @@ def leaf() -> Pixels:
     mottle = noise(rng, 256, 256, 12, 12, 3)
     green = blend(colour("#2f6a2c"), colour("#5e9a40"), 0.9 * mottle + 0.5 * off)
     return pixels(blend(green, colour("#a9c878"), np.maximum(0.45 * veins, 0.8 * midrib)))
+
+
+def twig() -> tuple[Pixels, NDArray[np.uint8]]:
+    """A twig with leaves, 256², growing along v, and its coverage (256, 256) uint8. Does not repeat."""
+    u, v = coordinates(256, 256)
+    rng = np.random.default_rng(17)
+    covered = (np.abs(u - 0.5) < 0.012) & (v < 0.86)
+    shade = np.zeros((256, 256), np.float32)
+    for k in range(13):
+        side = 1.0 if k % 2 else -1.0
+        root_v, length, slant = 0.08 + 0.062 * k, 0.3 - 0.008 * k, 0.6 + 0.25 * float(rng.random())
+        along = side * (u - 0.5) * math.cos(slant) + (v - root_v) * math.sin(slant)
+        across = -side * (u - 0.5) * math.sin(slant) + (v - root_v) * math.cos(slant)
+        t = np.clip(along / length, 0.0, 1.0)
+        inside = (along > 0.0) & (along < length) & (np.abs(across) < 0.3 * length * np.sin(np.pi * t**0.8))
+        shade = np.where(inside, 0.25 + 0.5 * t + 0.2 * (np.abs(across) < 0.006), shade).astype(np.float32)
+        covered |= inside
+    image = pixels(blend(colour("#2f6a2c"), colour("#86b556"), shade))
+    return image, np.where(covered, np.uint8(255), np.uint8(0))

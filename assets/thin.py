@@ -1,4 +1,4 @@
-"""A picket fence, a wire mesh, grass and a shrub in front of a patterned wall: much that is thinner than a pixel.
+"""A picket fence, a wire mesh, grass, a shrub and a hedge of cut-out twigs: much that is thinner than a pixel.
 
 There for disocclusion: with every step of the camera strips of the background come into view that have no history, and
 guides change from pixel to pixel.
@@ -12,7 +12,7 @@ from assets import textures
 from assets.motion import slide, swing
 from assets.plants import leaf
 from assets.sets import panel, room, stage_with_paints, swaying
-from assets.shapes import Shape, block, join
+from assets.shapes import Shape, block, join, quad
 from assets.stage import Part
 from assets.surfaces import rod, tube
 from assets.textures import linear
@@ -88,6 +88,17 @@ def _shrub(rng: np.random.Generator, twigs: int) -> tuple[Shape, Shape]:
     return join(leaves), join(stems)
 
 
+def _hedge(rng: np.random.Generator, count: int) -> Shape:
+    """Cards with a twig on each, in a box 1.1 m wide, 1 m high and 0.4 m deep above the origin."""
+    card = quad([(-0.16, 0.0, 0.0), (0.16, 0.0, 0.0), (0.16, 0.32, 0.0), (-0.16, 0.32, 0.0)])
+    cards = []
+    for _ in range(count):
+        turned = card.turned("x", float(rng.uniform(-50, 50))).turned("y", float(rng.uniform(-75, 75)))
+        x, y, z = rng.uniform((-0.55, 0.05, -0.2), (0.55, 0.75, 0.2)).tolist()
+        cards.append(turned.moved(x, y, z))
+    return join(cards)
+
+
 def build(*, animate: bool = False) -> Scene:
     """With ``animate`` the lamp slides and a gate of wire swings."""
     stage = stage_with_paints(animate, "white", "red", "blue", "green")
@@ -95,6 +106,8 @@ def build(*, animate: bool = False) -> Scene:
     stage.material("parquet", (1.0, 1.0, 1.0), stage.texture("parquet", textures.parquet()))
     stage.material("wood", (0.35, 0.22, 0.12))
     stage.material("steel", (0.35, 0.36, 0.38))
+    twig, coverage = textures.twig()
+    stage.material("twig", (1.0, 1.0, 1.0), stage.texture("twig", twig, coverage), cutoff=0.5)
     stage.material("lamp", (0.5, 0.5, 0.5), emission=(11.0, 10.0, 8.5))
     rng = np.random.default_rng(5)
     stage.add("room", room(6.0, 2.6, 5.0, "wallpaper", "red", "blue", "parquet"))
@@ -103,6 +116,7 @@ def build(*, animate: bool = False) -> Scene:
     stage.add("gate", _mesh(0.9, 1.2, 0.06), swing((0.35, 0.015, 2.2), "y", 40.0, CYCLE))
     leaves, stems = _shrub(rng, 26)
     stage.add("shrub", [(leaves.moved(-1.3, 0.0, 1.1), "green"), (stems.moved(-1.3, 0.0, 1.1), "wood")])
+    stage.add("hedge", [(_hedge(rng, 110).moved(1.9, 0.0, 2.0), "twig")])
     stage.add("grass", [(_grass(rng, 420), "green")])
     stage.add("lamp", [(panel(1.6, 1.0), "lamp")], slide((0.0, 2.55, 2.9), (0.7, 0.0, 0.0), CYCLE))
     flight = swaying(_EYE, _TARGET, 0.8, 0.9, 40.0)

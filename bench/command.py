@@ -118,10 +118,11 @@ def _quality(
 ) -> QualityResult:
     """Trace the sequence of ``case``, complete its references, run every method."""
     found, seconds = references.fill(shot, SCORED, effort.samples, effort.slice)
-    packets = running.trace(shot)
+    footage = running.Footage(shot)
+    packets = footage()
     truth = Truth(packets, found)
     times = path_tracing.TracingTimes(shot)
-    results = running.measure(packets, truth, config, new_renderer, effort.repeats, methods, times)
+    results = running.measure(packets, truth, config, new_renderer, effort.repeats, methods, times, footage)
     result = QualityResult(
         scene=case.scene,
         motion=case.motion,

@@ -20,11 +20,11 @@ from bench.methods import METHODS, Method, NewRenderer
 from bench.metrics import Mask, rmse
 from bench.metrics_time import Deviation, recovery, steady
 from bench.references import ReferenceCache
-from bench.running import Contestant, available, contestant
+from bench.running import Contestant, available, contestant, remembers
 from config import Config
 from console import Progress
 from raytrace.camera import Camera
-from raytrace.frame import MISS, FramePacket, Vector
+from raytrace.frame import MISS, FramePacket
 from raytrace.scene import Scene
 from raytrace.shot import FPS, Shot
 from session import open_tracer
@@ -39,6 +39,8 @@ SIDESTEP = 0.12
 
 DIMMED = 0.25
 """What is left of the lamp's radiance once it is switched."""
+
+REST, CUT, SWITCH, STEP = "at rest", "cut", "light switched", "disocclusion"
 
 _SLICE = 64
 _DEPTH = 0.02  # share of the depth by which a point seen before may differ and still be the same
@@ -72,12 +74,10 @@ class EventsResult:
 
 
 @dataclass(frozen=True)
-class Film:
-    """``packets`` of one sequence; ``truth`` (H, W, 3): linear radiance from the event on, ``noise`` its RMSE on
-    ``mask``, the pixels that count."""
+class Truth:
+    """From the event on: ``radiance`` (H, W, 3), linear, ``noise`` its RMSE on ``mask``, the pixels that count."""
 
-    packets: tuple[FramePacket, ...]
-    truth: NDArray[np.float64]
+    radiance: NDArray[np.float64]
     mask: Mask
     noise: float
 
@@ -91,34 +91,37 @@ def measure(
 ) -> EventsResult:
     """Run the ``methods`` through all events. Raises UserError where references cannot be kept."""
     chosen = [m for m in available(methods) if not m.taa and (effort.stages or not m.stage)]
-    still, films, seconds = _films(config, references, effort)
     results = []
-    with Progress(f"{len(chosen)} methods through {1 + len(films)} events") as progress:
-        for number, method in enumerate(chosen):
-            runner = contestant(method, config, new_renderer())
-            try:
-                results.append(_run(runner, still, films, effort.frames[0]))
-            finally:
-                runner.release()
-            progress.update((number + 1) / len(chosen))
-    noise = {name: film.noise for name, film in films.items()}
+    with ExitStack() as stack:
+        films = Films(config, effort, stack)
+        seconds = films.converge(references)
+        with Progress(f"{len(chosen)} methods through {len(films.truths)} events") as progress:
+            for number, method in enumerate(chosen):
+                runner = contestant(method, config, new_renderer())
+                try:
+                    results.append(_run(runner, films, remembers(method, config)))
+                finally:
+                    runner.release()
+                progress.update((number + 1) / len(chosen))
+    noise = {name: truth.noise for name, truth in films.truths.items()}
     return EventsResult(SCENE, effort.size, effort.frames, effort.samples, noise, tuple(results), seconds)
 
 
-def _run(runner: Contestant, still: tuple[FramePacket, ...], films: dict[str, Film], event: int) -> EventResult:
+def _run(runner: Contestant, films: Films, rule: str) -> EventResult:
     deviation = Deviation()
-    mask = still[0].emission[..., :3].max(axis=2) == 0.0
-    for packet in still:
+    rest = films.packets(REST, rule)
+    mask = rest[0].emission[..., :3].max(axis=2) == 0.0
+    for packet in rest:
         runner.filter(packet, None)
-        if packet.index >= len(still) // 2:
+        if packet.index >= len(rest) // 2:
             deviation.add(runner.radiance())
     errors: dict[str, tuple[float, ...]] = {}
-    for name, film in films.items():
+    for name, truth in films.truths.items():
         found = []
-        for packet in film.packets:
+        for packet in films.packets(name, rule):
             runner.filter(packet, None)
-            if packet.index >= event:
-                found.append(rmse(runner.radiance(), film.truth, film.mask))
+            if packet.index >= films.event:
+                found.append(rmse(runner.radiance(), truth.radiance, truth.mask))
         errors[name] = tuple(found)
     return EventResult(
         name=runner.method.name,
@@ -131,55 +134,68 @@ def _run(runner: Contestant, still: tuple[FramePacket, ...], films: dict[str, Fi
     )
 
 
-def _films(
-    config: Config, references: ReferenceCache, effort: EventEffort
-) -> tuple[tuple[FramePacket, ...], dict[str, Film], float]:
-    """The sequence at rest, those with an event by name, and the seconds that their references took."""
-    scene = assets.build(SCENE)
-    assert scene.flight is not None
-    here, there = scene.camera, scene.flight(CUT_TO / FPS)
-    first, then = effort.frames
-    films, seconds = {}, 0.0
-    with ExitStack() as stack:
+class Films:
+    """The sequences by name, each traced once for every rule by which points are remembered, and what is true from
+    frame ``event`` on (:meth:`converge`). ``stack`` closes the tracers."""
 
-        def shot(scene: Scene, cameras: list[Camera]) -> Shot:
+    def __init__(self, config: Config, effort: EventEffort, stack: ExitStack) -> None:
+        scene = assets.build(SCENE)
+        assert scene.flight is not None
+        here, there = scene.camera, scene.flight(CUT_TO / FPS)
+        self.event, then = effort.frames
+        self._count, self._samples = self.event + then, effort.samples
+        self._packets: dict[tuple[str, str], tuple[FramePacket, ...]] = {}
+        self.truths: dict[str, Truth] = {}
+
+        def shot(scene: Scene, after: Camera, animate: bool = False) -> Shot:
             compiled, tracer = open_tracer(scene, config)
             stack.callback(tracer.close)
-            return Shot(compiled, tracer, effort.size, cameras)
+            return Shot(compiled, tracer, effort.size, [here] * self.event + [after], animate)
 
-        def film(before: Shot, after: Shot, cut: bool = False) -> Film:
-            nonlocal seconds
-            packets = [before.frame(index) for index in range(first)]
-            for index in range(first, first + then):
-                packet = after.frame(index)
-                packets.append(replace(packet, scene_id=packets[0].scene_id, cut=cut and index == first))
-            found, took = references.fill(after, [first], effort.samples, _SLICE)
+        rest = shot(scene, here)
+        self._shots = {
+            REST: rest,
+            CUT: shot(scene, there),
+            SWITCH: shot(switched(scene, self.event), here, animate=True),
+            STEP: shot(scene, sidestepped(here, SIDESTEP * rest.scene.extent)),
+        }
+
+    def packets(self, name: str, rule: str = "") -> tuple[FramePacket, ...]:
+        """All frames of a sequence, with points remembered by ``rule``."""
+        if (name, rule) not in self._packets:
+            shot = self._shots[name]
+            shot.remember = rule
+            packets = [shot.frame(index) for index in range(self._count)]
+            if name == CUT:
+                packets[self.event] = replace(packets[self.event], cut=True)
+            self._packets[name, rule] = tuple(packets)
+        return self._packets[name, rule]
+
+    def converge(self, references: ReferenceCache) -> float:
+        """Complete the references; returns the seconds that took."""
+        seconds = 0.0
+        for name, shot in self._shots.items():
+            if name == REST:
+                continue
+            found, took = references.fill(shot, [self.event], self._samples, _SLICE)
             seconds += took
-            mask = packets[first].emission[..., :3].max(axis=2) == 0.0
-            reference = found[first]
-            return Film(tuple(packets), reference.radiance(packets[first]), mask, reference.noise(packets[first], mask))
-
-        rest = shot(scene, [here])
-        still = tuple(rest.frame(index) for index in range(first + then))
-        jump = shot(scene, [here] * first + [there])
-        films["cut"] = film(jump, jump, cut=True)
-        films["light switched"] = film(rest, shot(dimmed(scene), [here]))
-        step = shot(scene, [here] * first + [sidestepped(here, SIDESTEP * rest.scene.extent)])
-        uncovered = film(step, step)
-        hidden = uncovered.mask & disoccluded(uncovered.packets[first], uncovered.packets[first - 1])
-        films["disocclusion"] = replace(uncovered, mask=hidden)
-    return still, films, seconds
+            reference, packets = found[self.event], self.packets(name)
+            now = packets[self.event]
+            mask = now.emission[..., :3].max(axis=2) == 0.0
+            if name == STEP:
+                mask &= disoccluded(now, packets[self.event - 1])
+            self.truths[name] = Truth(reference.radiance(now), mask, reference.noise(now, mask))
+        return seconds
 
 
-def dimmed(scene: Scene) -> Scene:
-    """``scene`` with :data:`DIMMED` of the radiance of its lamps and its sky."""
+def switched(scene: Scene, event: int) -> Scene:
+    """``scene``, whose lamps give :data:`DIMMED` of their light from frame ``event`` on."""
 
-    def scaled(color: Vector) -> Vector:
-        red, green, blue = (DIMMED * channel for channel in color)
-        return red, green, blue
+    def dimmer(time: float) -> float:
+        return 1.0 if time < (event - 0.5) / FPS else DIMMED
 
-    materials = tuple(replace(material, emission=scaled(material.emission)) for material in scene.materials)
-    return replace(scene, materials=materials, sky=None if scene.sky is None else scaled(scene.sky))
+    materials = (replace(material, dimmer=dimmer) if material.emits else material for material in scene.materials)
+    return replace(scene, materials=tuple(materials))
 
 
 def sidestepped(camera: Camera, distance: float) -> Camera:

@@ -98,6 +98,26 @@ _LISTED = (
     BMFR_TAA,
     BMFR_PAPER,
     Method("BMFR, reference constants", "bmfr", preset="reference", group="BMFR"),
+    Method("A-SVGF", "asvgf", group="A-SVGF"),
+    Method("BMFR, adaptive", "bmfr", settings=("bmfr.adaptive=true",), group="BMFR"),
+    # Filters in space, over time before or after, as baselines.
+    Method("Gaussian blur", "gaussian", group="spatial"),
+    Method("bilateral filter", "bilateral", group="spatial"),
+    Method("joint bilateral filter", "joint", group="spatial"),
+    Method("joint bilateral, separable", "joint-separable", group="spatial"),
+    Method("à-trous, edges by hand", "atrous", group="spatial"),
+    Method("à-trous, random taps", "atrous-jitter", group="spatial"),
+    Method("guided filter", "guided", group="spatial"),
+    *(
+        Method(f"{name}, blended first", name, settings=("spatial.order=blend-first",), group="spatial", stage=True)
+        for name in ("gaussian", "joint", "atrous", "guided")
+    ),
+    Method("joint, frames alone", "joint", settings=("spatial.temporal=false",), group="spatial", stage=True),
+    # Every estimator of the variance that steers SVGF.
+    *(
+        _svgf(f"with variance {name}", f"svgf.variance={name}")
+        for name in ("raw-mean", "welford", "welford-mean", "spatial", "spatial-temporal", "exaggerated")
+    ),
     # Each stage switched off in turn, and choices the other way.
     _svgf("without accumulation", "svgf.temporal=false"),
     _svgf("without the variance", "svgf.variance_guided=false"),

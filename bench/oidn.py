@@ -7,6 +7,7 @@ gets is what our filters get: emission is kept out and added afterwards.
 from __future__ import annotations
 
 import importlib.util
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -36,6 +37,7 @@ class Filter:
 
         self.size = size
         self._color, self._albedo, self._normal, self._out = np.zeros((4, size[1], size[0], 3), np.float32)
+        self._dark = np.zeros((size[1], size[0], 4), np.float32)
         self._device: Any = pyoidn.Device(pyoidn.OIDN_DEVICE_TYPE_CPU)
         self._device.commit()
         self._filter: Any = pyoidn.Filter(self._device, pyoidn.OIDN_FILTER_TYPE_RT)
@@ -50,10 +52,11 @@ class Filter:
 
     def run(self, packet: FramePacket) -> F32:
         """Linear radiance of ``packet``, filtered, (H, W, 4)."""
-        np.add(packet.direct[..., :3], packet.indirect[..., :3], out=self._color)
+        self._color[:] = replace(packet, emission=self._dark).radiance()
         self._albedo[:] = packet.albedo[..., :3]
+        if packet.specular_albedo is not None:
+            self._albedo += packet.specular_albedo[..., :3]
         self._normal[:] = packet.surface[..., :3]
-        self._color *= self._albedo
         self._filter.execute()
         self._check()
         radiance = np.ones((*self._out.shape[:2], 4), np.float32)

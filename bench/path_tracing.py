@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bench.cases import FIRST_MEASURED, SCORED
 from bench.scores import Errors, Pictures, Score, Truth
@@ -14,6 +15,8 @@ from bench.timing import Summary
 from console import Progress
 from raytrace.frame import FramePacket
 from raytrace.shot import Shot
+
+F64 = NDArray[np.float64]
 
 _FIRST_SAMPLE = 1 << 20
 """Beyond the samples of any reference: what is judged shares no path with its judge."""
@@ -79,18 +82,17 @@ def measure(
     scores = {count: Score(truth) for count in wanted}
     with Progress(f"{shot.scene.scene.name}: path tracing, up to {wanted[-1]} paths") as progress:
         for number, index in enumerate(SCORED):
-            sums = np.zeros((shot.size[1], shot.size[0], 3))
+            sums: tuple[F64, ...] = ()
             done = 0
             for count in wanted:
                 first = _FIRST_SAMPLE + index * _STRIDE + done
                 means = shot.tracer.reference(
                     shot.camera(index), shot.size, count - done, shot.time(index), first_sample=first
                 )
-                sums += (means[0] + means[1]) * (count - done)
+                added = tuple(mean * (count - done) for mean in means)
+                sums = tuple(before + more for before, more in zip(sums, added, strict=True)) if sums else added
                 done = count
-                packet = packets[index]
-                radiance = sums / count * packet.albedo[..., :3] + packet.emission[..., :3]
-                image = radiance.astype(np.float32)
+                image = packets[index].modulated(*(total / count for total in sums)).astype(np.float32)
                 scores[count].watch(index, image)
                 scores[count].add(index, image)
             progress.update((number + 1) / len(SCORED))

@@ -24,6 +24,7 @@ from bench.scores import Errors, Pictures, Score, Truth
 from bench.timing import Summary
 from config import Config
 from console import Progress
+from gl.pipelines import remembered
 from gl.profiler import Profiler, is_software
 from gl.renderer import Renderer, read
 from raytrace.frame import FramePacket
@@ -150,15 +151,16 @@ class OidnContestant:
 class _Runner:
     """A contestant with its times and its score."""
 
-    def __init__(self, contestant: Contestant, renderer: Renderer, truth: Truth) -> None:
-        self.contestant, self._ctx = contestant, renderer.ctx
+    def __init__(self, contestant: Contestant, renderer: Renderer, truth: Truth, frames: Sequence[FramePacket]) -> None:
+        self.contestant, self._ctx, self._frames = contestant, renderer.ctx, frames
         self.score = Score(truth)
         self._software = is_software(renderer.ctx)
         self._profiler = Profiler(renderer.ctx)
         self._wall: list[float] = []
 
-    def run(self, packet: FramePacket, profiled: bool, watched: bool) -> None:
+    def run(self, index: int, profiled: bool, watched: bool) -> None:
         """Filter one frame. ``profiled``: time its passes instead of the whole; ``watched``: look at the result."""
+        packet = self._frames[index]
         measured = packet.index >= FIRST_MEASURED
         profiler = self._profiler if profiled and measured else None
         self._ctx.finish()
@@ -206,6 +208,11 @@ def available(methods: Sequence[Method]) -> tuple[Method, ...]:
     return tuple(method for method in methods if not method.quality or oidn.installed())
 
 
+def remembers(method: Method, config: Config) -> str:
+    """By which rule the tracer is to remember points for ``method``; "" for none."""
+    return "" if method.quality else remembered(method.configure(config), method.denoiser)
+
+
 def contestant(method: Method, config: Config, renderer: Renderer) -> Contestant:
     """``renderer`` becomes the contestant's own."""
     return (OidnContestant if method.quality else GlContestant)(method, config, renderer)
@@ -221,6 +228,24 @@ def trace(shot: Shot) -> list[FramePacket]:
     return packets
 
 
+class Footage:
+    """The frames of a shot, traced once, and once more for each rule of :data:`raytrace.gradients.RULES` by which a
+    method wants points remembered: every method gets what it would get in use."""
+
+    def __init__(self, shot: Shot) -> None:
+        self._shot = shot
+        self._frames: dict[str, list[FramePacket]] = {}
+
+    def __call__(self, rule: str = "") -> list[FramePacket]:
+        if rule not in self._frames:
+            before, self._shot.remember = self._shot.remember, rule
+            try:
+                self._frames[rule] = trace(self._shot)
+            finally:
+                self._shot.remember = before
+        return self._frames[rule]
+
+
 def measure(
     packets: Sequence[FramePacket],
     truth: Truth,
@@ -229,24 +254,28 @@ def measure(
     repeats: int,
     methods: Sequence[Method] = METHODS,
     beside: Callable[[int], None] | None = None,
+    footage: Callable[[str], Sequence[FramePacket]] | None = None,
 ) -> tuple[MethodResult, ...]:
     """Run ``methods``, of which the first must be the noisy frame itself, in lockstep over ``packets``.
 
     ``packets`` are the frames 0, 1, ... of a sequence; errors are taken in the first repeat, being the same in all.
-    ``beside``: called with the index of each frame, to measure in the same loop what is no method.
+    ``beside``: called with the index of each frame, to measure in the same loop what is no method. ``footage``: the
+    same frames with points remembered by a rule, for the methods that want that.
     """
     runners = []
     try:
         for method in available(methods):
             renderer = new_renderer()
-            runners.append(_Runner(contestant(method, config, renderer), renderer, truth))
+            rule = remembers(method, config)
+            frames = footage(rule) if footage is not None and rule else packets
+            runners.append(_Runner(contestant(method, config, renderer), renderer, truth, frames))
         with Progress(f"{len(runners)} methods") as progress:
             for repeat in range(repeats):
-                for index, packet in enumerate(packets):
+                for index in range(len(packets)):
                     if beside is not None:
                         beside(index)
                     for runner in runners:
-                        runner.run(packet, (index + repeat) % 2 == 1, watched=repeat == 0)
+                        runner.run(index, (index + repeat) % 2 == 1, watched=repeat == 0)
                     progress.update((repeat * len(packets) + index + 1) / (repeats * len(packets)))
         return tuple(runner.result(runners[0].score) for runner in runners)
     finally:

@@ -1,4 +1,4 @@
-"""How the tracer's time grows: with pixels, triangles and threads, and with features that are compiled in for nothing.
+"""How the tracer's time grows: with pixels, triangles and threads. What features cost: :mod:`bench.features`.
 
     .venv/bin/python -m bench.scaling
 
@@ -8,6 +8,7 @@ alike. Ratios are those of processor time, of all threads together, which other 
 
 from __future__ import annotations
 
+import argparse
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -21,7 +22,6 @@ from raytrace.camera import Camera
 from raytrace.compiled import compile_scene
 from raytrace.integrator import Settings, Tracer
 from raytrace.scene import Material, Mesh, Scene
-from raytrace.tables import Variant
 
 SIZES = ((320, 180), (640, 360), (960, 540), (1280, 720), (1920, 1080))
 TRIANGLES = (1_000, 10_000, 100_000, 1_000_000)
@@ -120,21 +120,6 @@ def by_threads(scene: Scene, threads: Sequence[int] = THREADS, size: Size = MIDD
     return _relative(taken)
 
 
-def by_feature(scene: Scene, size: Size = MIDDLE, repeats: int = 7) -> list[Row]:
-    """Each feature that ``scene`` lacks compiled in all the same; ``relative``: to compiled out."""
-    compiled = compile_scene(scene)
-    with Tracer(compiled) as plain:
-        lacking = [name for name in Variant._fields if not getattr(plain.variant, name)]
-    settings = {"as it needs": Settings()} | {f"with {name}": Settings(also=(name,)) for name in lacking}
-    tracers = {name: Tracer(compiled, setting) for name, setting in settings.items()}
-    try:
-        taken = medians({name: _frames(tracer, size) for name, tracer in tracers.items()}, repeats)
-    finally:
-        for tracer in tracers.values():
-            tracer.close()
-    return _relative(taken)
-
-
 def _relative(taken: Mapping[str, Times]) -> list[Row]:
     """Rows relative to the first."""
     first = next(iter(taken.values()))[1]
@@ -149,14 +134,22 @@ def table(title: str, rows: Sequence[Row], relative: str) -> str:
     return "\n".join(lines)
 
 
+def build_parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        "bench.scaling", description="how tracing grows with pixels, triangles and threads"
+    )
+    parser.add_argument("--repeats", type=int, default=7, help="frames of each that count (default 7)")
+    return parser
+
+
 def main() -> int:
     """All tables, on stdout."""
+    repeats = max(1, build_parser().parse_args().repeats)
     try:
-        cornell, interior = assets.build("cornell"), assets.build("interior")
-        print(table("interior by size", by_size(interior), "per pixel, relative"), flush=True)
-        print(table("\nterrain by triangles, 640x360", by_triangles(), "relative"), flush=True)
-        print(table("\ninterior by threads, 640x360", by_threads(interior), "relative"), flush=True)
-        print(table("\ncornell with features that it lacks, 640x360", by_feature(cornell), "relative"), flush=True)
+        interior = assets.build("interior")
+        print(table("interior by size", by_size(interior, repeats=repeats), "per pixel, relative"), flush=True)
+        print(table("\nterrain by triangles, 640x360", by_triangles(repeats=repeats), "relative"), flush=True)
+        print(table("\ninterior by threads, 640x360", by_threads(interior, repeats=repeats), "relative"), flush=True)
     except UserError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2

@@ -31,9 +31,9 @@ DENOISERS = {
     "gaussian": "Gaussian blur",
     "bilateral": "bilateral filter (Tomasi and Manduchi 1998)",
     "joint": "joint bilateral filter on depth and normals (Petschnigg et al. 2004)",
-    "joint-separable": "the same, approximated by rows and columns",
+    "joint-separable": "joint bilateral filter, approximated by rows and columns (Pham and van Vliet 2005)",
     "atrous": "à-trous wavelet with edges set by hand (Dammertz et al. 2010)",
-    "atrous-jitter": "the same with fewer taps, drawn at random",
+    "atrous-jitter": "à-trous wavelet with edges set by hand and few taps, drawn at random",
     "guided": "guided filter on depth and normals (He et al. 2010, Bauszat et al. 2011)",
     "reference": "mean of many paths per pixel of the same frame",
 }

@@ -133,8 +133,7 @@ class Settings:
     """How frames are traced. ``generator``: HALTON or HASH; ``threads`` 0 = one per core; ``tile`` pixels per tile;
     ``positions``: frames carry world positions; ``backend``: see :func:`raytrace.embree.open_caster`; ``regularize``:
     narrow lobes are widened at a path's second hit, never in references; ``separable``: Smith's masking in its older,
-    separable form, as some renderers have it; ``also``: features (fields of :class:`Variant`) compiled in although the
-    scene lacks them, to measure what that costs."""
+    separable form, as some renderers have it."""
 
     seed: int = 0
     generator: int = HALTON
@@ -144,19 +143,19 @@ class Settings:
     backend: str = "auto"
     regularize: bool = True
     separable: bool = False
-    also: tuple[str, ...] = ()
 
 
 class Tracer:
     """Traces one compiled scene. ``with Tracer(...)`` or :meth:`close` ends its threads.
 
-    ``images``: names of those its frames have. ``scene_id``: their number, which no other tracer of this process gives.
+    ``variant``: what is compiled in, if that is to be more than the scene needs. ``images``: names of those its frames
+    have. ``scene_id``: their number, which no other tracer of this process gives.
     """
 
-    def __init__(self, scene: CompiledScene, settings: Settings | None = None) -> None:
+    def __init__(self, scene: CompiledScene, settings: Settings | None = None, variant: Variant | None = None) -> None:
         self.scene = scene
         self.settings = settings or Settings()
-        self.variant: Variant = variant_of(scene)._replace(**dict.fromkeys(self.settings.also, True))
+        self.variant: Variant = variant or variant_of(scene)
         self.images = images_of(self.variant, self.settings.positions)
         self.scene_id = next(_identities)
         self.rays = open_caster(scene.triangles, scene.static_count, self.settings.backend)

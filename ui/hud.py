@@ -54,18 +54,23 @@ def _head(status: Status) -> None:
 
 def _methods(state: State) -> None:
     """A button for every method that has a key; the one shown is lit."""
+    space = 0.0  # left on the line
     for binding in BINDINGS:
         if binding.action in (Action.SHOW, Action.PREVIOUS):
             lit = binding.value == state.denoiser
+            text = f"{binding.label}  {binding.value or state.before}"
+            width = imgui.calc_text_size(text).x + 2.0 * imgui.get_style().frame_padding.x
+            if space and width > space:
+                imgui.new_line()
             if binding.action is Action.SHOW and lit:
                 imgui.push_style_color(imgui.Col_.button, theme.LIT)
-            name = binding.value or state.before
-            if imgui.button(f"{binding.label}  {name}##method"):
+            if imgui.button(f"{text}##method"):
                 state.perform(binding)
             if lit:
                 imgui.pop_style_color()
             widgets.tooltip(binding.help)
             imgui.same_line()
+            space = imgui.get_content_region_avail().x
     imgui.new_line()
     if state.denoiser not in {binding.value for binding in BINDINGS}:
         widgets.text(f"{state.denoiser}: {DENOISERS[state.denoiser]}", theme.DIM, wrap=True)

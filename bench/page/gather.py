@@ -9,7 +9,7 @@ from bench.claims import claims
 from bench.events import EventsResult
 from bench.files import plain
 from bench.goals import GOALS
-from bench.methods import METHODS
+from bench.methods import METHODS, PATH_TRACING
 from bench.oidn import INSTALL
 from bench.page.pictures import encoded
 from bench.results import Contender, QualityResult, Report, contenders
@@ -85,6 +85,7 @@ def _errors(errors: Errors) -> dict[str, float]:
 
 
 def _contender(c: Contender, method: MethodResult | None) -> dict[str, Any]:
+    exact = not c.stage and c.group != PATH_TRACING
     equal = None
     if c.equal is not None:
         equal = {"samples": c.equal.samples, **_errors(c.equal.errors)}
@@ -102,7 +103,7 @@ def _contender(c: Contender, method: MethodResult | None) -> dict[str, Any]:
         "competes": c.competes,
         "front": {"rmse": c.best_rmse, "flip": c.best_flip},
         "passes": [[row.name, row.milliseconds] for row in method.passes] if method else [],
-        "pictures": encoded(c.pictures) if c.pictures is not None and c.competes else None,
+        "pictures": encoded(c.pictures, exact) if c.pictures is not None and c.competes else None,
     }
 
 

@@ -2,6 +2,8 @@
 
 const viewer = (() => {
   const REFERENCE = "reference", MOST = 10;
+  // What gets a number key where there are more methods than keys; the lists have them all.
+  const PREFERRED = ["noisy", "accumulation", "SVGF, one signal", "SVGF, direct and indirect", "A-SVGF", "BMFR", "guided filter", "OIDN, fast"];
   const images = new Map();               // data URI -> Image
   const pane = { a: REFERENCE, b: REFERENCE };
   let view = { x: 0.5, y: 0.5, zoom: 1 }; // centre in parts of the picture, magnification against the fitted picture
@@ -15,7 +17,10 @@ const viewer = (() => {
     // Of path tracing, what fits into the time of the slowest of our filters.
     const slowest = Math.max(...others.filter((m) => m.group !== "OIDN").map((m) => m.ms));
     const best = traced.filter((m) => m.ms <= slowest).slice(-1);
-    const order = [...others.slice(0, MOST - 1 - best.length), ...best];
+    const first = PREFERRED.map((name) => others.find((m) => m.name === name)).filter(Boolean);
+    const rest = others.filter((m) => !first.includes(m));
+    const chosen = [...first, ...rest].slice(0, MOST - 1 - best.length);
+    const order = [...others.filter((m) => chosen.includes(m)), ...best];
     return [REFERENCE, ...order.map((m) => m.name)];
   }
   const all = () => [REFERENCE, ...scene().methods.filter((m) => m.pictures).map((m) => m.name)];
@@ -186,15 +191,16 @@ const viewer = (() => {
   function drawStrips() {
     const rows = [];
     for (const name of slots()) {
-      const uri = picturesOf(name).strip, canvas = make("canvas", { "aria-label": `${name}: one line of pixels over time` });
+      const uri = picturesOf(name).strip;
+      if (!uri) continue;
+      const canvas = make("canvas", { "aria-label": `${name}: one line of pixels over time` });
       const source = new Image();
       source.onload = () => {
         canvas.width = source.naturalWidth;
         canvas.height = source.naturalHeight * 3;
         const context = canvas.getContext("2d");
         context.imageSmoothingEnabled = false;
-        const traced = name === REFERENCE || scene().methods.find((m) => m.name === name).group === "path tracing";
-        if (!traced) context.drawImage(source, 0, 0, canvas.width, canvas.height);
+        if (name !== REFERENCE) context.drawImage(source, 0, 0, canvas.width, canvas.height);
         else for (const row of scene().scored) context.drawImage(source, 0, row, source.naturalWidth, 1, 0, 3 * row, canvas.width, 3);
       };
       source.src = uri;
@@ -202,7 +208,7 @@ const viewer = (() => {
     }
     byId("strips").replaceChildren(...rows);
     byId("strip-say").textContent = `The line of pixels at half the height, frame ${scene().stripFrames[0]} on top to frame ${scene().stripFrames.slice(-1)[0]} below. ` +
-      "What flickers is rough from line to line; what lags is smeared. Of the reference and of path tracing there are only the scored frames. Below, the error in each of them.";
+      "What flickers is rough from line to line; what lags is smeared. Of the reference there are only the scored frames. Below, the error in each of them.";
   }
 
   // Matplotlib's magma (CC0), interpolated between a few of its colours.

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from config import Asvgf
 from gl.graph import FragmentPass, Graph, In, Out, Tex, Uniform
-from gl.passes.svgf import svgf
+from gl.passes.svgf import squarings, svgf
 from gl.passes.temporal import Change, Guides
 from raytrace.frame import STRATUM
 
@@ -83,7 +83,12 @@ def change_of(g: Graph, direct: Tex, indirect: Tex, guides: Guides, p: Asvgf, pi
             u_sigma_n=float(p.sigma_n),
             u_sigma_l=p.gradient_sigma_l,
             u_pixel_size=pixel_size,
-            defines={"STEP": 1 << i, "FIRST": int(i == 0), "JOINT": int(joint)},
+            defines={
+                "STEP": 1 << i,
+                "FIRST": int(i == 0),
+                "JOINT": int(joint),
+                "SIGMA_N_SQUARINGS": squarings(p.sigma_n),
+            },
         )
         change = g.add(
             iteration,
@@ -98,7 +103,7 @@ def change_of(g: Graph, direct: Tex, indirect: Tex, guides: Guides, p: Asvgf, pi
         u_sigma_z=p.sigma_z,
         u_sigma_n=float(p.sigma_n),
         u_pixel_size=pixel_size,
-        defines={"WIDEN": int(p.widen), "FOLLOW": int(p.follow)},
+        defines={"WIDEN": int(p.widen), "FOLLOW": int(p.follow), "SIGMA_N_SQUARINGS": squarings(p.sigma_n)},
     )
     return g.add(
         work,

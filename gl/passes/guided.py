@@ -78,6 +78,7 @@ class GuidedMean(FragmentPass):
     in_blue = In(SLOPES)
     in_color = In("rgb: what the function says at the pixel's guide; a: number of windows")
     in_surface = In(SURFACE)
+    in_sample = In("what is filtered, for pixels that no window holds", optional=True)
     out_color = Out("rgba16f", COLOR)
     u_radius = Uniform("int", "> 0, half the window's side, pixels")
 
@@ -123,4 +124,5 @@ def guided(g: Graph, color: Tex, surface: Tex, p: Guided, pixel_size: float) -> 
         in_blue=mean.out_blue,
         in_color=mean.out_color,
         in_surface=surface,
+        in_sample=color,
     ).out_color

@@ -60,23 +60,34 @@ class Gaussian(FragmentPass):
     shader = "spatial/gaussian.frag"
     in_color = In(COLOR)
     in_surface = In(SURFACE)
+    in_sample = In("what is filtered, for pixels on no surface; of the columns only", optional=True)
     out_color = Out("rgba16f", COLOR)
     u_radius = Uniform("int", "> 0, half the window's side, pixels")
     u_sigma_d = Uniform("float", "> 0, width of the Gaussian, pixels")
 
 
-class Bilateral(Gaussian):
+class Bilateral(FragmentPass):
     """Bilateral filter."""
 
     shader = "spatial/bilateral.frag"
+    in_color = In(COLOR)
+    in_surface = In(SURFACE)
+    out_color = Out("rgba16f", COLOR)
+    u_radius = Uniform("int", "> 0, half the window's side, pixels")
+    u_sigma_d = Uniform("float", "> 0, width of the Gaussian, pixels")
     u_sigma_r = Uniform("float", "> 0, tolerance for colour, irradiance")
 
 
-class JointBilateral(Gaussian):
-    """Joint bilateral filter; ``AXIS`` as there."""
+class JointBilateral(FragmentPass):
+    """Joint bilateral filter; ``AXIS`` 0: whole, 1: rows, 2: columns."""
 
     shader = "spatial/joint.frag"
+    in_color = In(COLOR)
+    in_surface = In(SURFACE)
     in_gradient = In(GRADIENT)
+    out_color = Out("rgba16f", COLOR)
+    u_radius = Uniform("int", "> 0, half the window's side, pixels")
+    u_sigma_d = Uniform("float", "> 0, width of the Gaussian, pixels")
     u_sigma_z = Uniform("float", "> 0, depth edge-stopping")
     u_sigma_n = Uniform("float", "> 0, exponent of the normals' cosine")
     u_pixel_size = Uniform("float", "> 0, scene units a pixel is wide at depth 1")
@@ -126,10 +137,11 @@ class Filter:
         return {"u_sigma_z": p.sigma_z, "u_sigma_n": float(p.sigma_n), "u_pixel_size": self._pixel_size}
 
     def gaussian(self, g: Graph, color: Tex) -> Tex:
-        p = self._config.gaussian
+        p, sample = self._config.gaussian, color
         for name, axis in _axes(p.separable):
             work = Gaussian(**window(p.sigma_d), defines={"AXIS": axis})
-            color = g.add(work, name, in_color=color, **self._surface).out_color
+            columns = {"in_sample": sample} if name == "columns" else {}
+            color = g.add(work, name, in_color=color, **self._surface, **columns).out_color
         return color
 
     def bilateral(self, g: Graph, color: Tex) -> Tex:

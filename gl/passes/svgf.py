@@ -60,13 +60,11 @@ class Atrous(FragmentPass):
     u_pixel_size = Uniform("float", "> 0, scene units a pixel is wide at depth 1")
 
     def __init__(self, p: Svgf, step: int, pixel_size: float, raw: bool = False, glossy: bool = False) -> None:
-        # A power of two is squared into place: pow() costs more than seven products.
-        squarings = p.sigma_n.bit_length() - 1
         gloss: dict[str, Any] = {"u_sigma_r": p.sigma_r, "u_reach": p.reach} if glossy else {}
         super().__init__(
             defines={
                 "STEP": step,
-                "SIGMA_N_SQUARINGS": squarings if p.sigma_n == 1 << squarings else -1,
+                "SIGMA_N_SQUARINGS": squarings(p.sigma_n),
                 "LUMINANCE_STOP": int(p.variance_guided),
                 "RAW": int(raw),
                 **(GLOSSY if glossy else {}),
@@ -93,6 +91,12 @@ class GlossyAtrous(Atrous):
 
     def __init__(self, p: Svgf, step: int, pixel_size: float, raw: bool = False) -> None:
         super().__init__(p, step, pixel_size, raw, glossy=True)
+
+
+def squarings(exponent: int) -> int:
+    """log2 of a power of two, -1 of any other number: squaring that often costs less than pow()."""
+    count = exponent.bit_length() - 1
+    return count if exponent == 1 << count else -1
 
 
 def svgf(

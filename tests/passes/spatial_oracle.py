@@ -25,7 +25,8 @@ def sample(packet: FramePacket) -> F64:
     """(H, W, 4): the sum of both signals, and whether there is any."""
     color = (packet.direct[..., :3] + packet.indirect[..., :3]).astype(np.float64)
     there = np.isfinite(color).all(-1) & np.isfinite(packet.surface).all(-1) & (packet.surface[..., 3] > 0)
-    return np.where(there[..., None], np.dstack([color, np.ones(there.shape)]), 0.0)
+    finite = np.asarray(np.isfinite(color).all(-1))
+    return np.where(finite[..., None], np.dstack([color, there]), 0.0)
 
 
 class Oracle:
@@ -38,6 +39,7 @@ class Oracle:
         self.pixel_size = packet.pixel_size
         self.hit = np.isfinite(self.surface).all(-1) & (self.surface[..., 3] > 0)
         self.size = self.hit.shape[1], self.hit.shape[0]
+        self.own = sample(packet)[..., :3]
 
     def run(self, denoiser: str, color: F64) -> F64:
         filters: dict[str, Callable[[F64], F64]] = {
@@ -71,7 +73,8 @@ class Oracle:
 
     def done(self, mean: F64, weights: F64) -> F64:
         there = self.hit & (weights > 0)
-        return np.where(there[..., None], np.dstack([mean, np.ones(there.shape)]), 0.0)
+        own = np.dstack([self.own, np.zeros(there.shape)])
+        return np.where(there[..., None], np.dstack([mean, np.ones(there.shape)]), own)
 
     def edges(self, dx: F64 | int, dy: F64 | int) -> F64:
         """w_z w_n of a tap, 0 where the guides are not finite."""

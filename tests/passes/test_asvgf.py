@@ -35,7 +35,7 @@ def preset(name: str) -> Asvgf:
         Asvgf(),
         preset("paper"),
         preset("reference"),
-        Asvgf(gain=3.0, cut="power", power=4.0, widen=True, gradient_iterations=2),
+        Asvgf(gain=3.0, cut="power", power=4.0, widen=True, gradient_iterations=2, sigma_n=100),
         Asvgf(separate=False, gradient_guided=False, color_clamp=True, alpha=0.05, alpha_moments=0.3),
     ],
     ids=["best", "paper", "reference", "power", "one signal"],

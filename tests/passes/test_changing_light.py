@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from config import Bmfr, Config, Svgf, Taa
+from config import Asvgf, Bmfr, Config, Svgf, Taa
 from raytrace.frame import FramePacket
 from tests.passes.asvgf_oracle import changing_room
 from tests.passes.harness import F32, HALF, Bench, frame, noise
@@ -80,6 +80,22 @@ def test_light_that_is_gone_is_gone_from_bmfr(bench: Bench) -> None:
     for seed in range(6):
         bench.denoise(wall(SIZE, noise(SIZE, seed), (0, 1, 0, 1)), bmfr(), "bmfr")
     assert bench.denoise(wall(SIZE, 0.0, (-1, 1, -1, 1)), bmfr(), "bmfr")["radiance"][..., :3].min() > 0.5
+
+
+@pytest.mark.parametrize(
+    ("denoiser", "names"),
+    [
+        ("asvgf", ["asvgf.direct.accumulate.out_color"]),
+        ("bmfr", ["bmfr.accumulate.out_color", "bmfr.accumulate_fit.out_color"]),
+    ],
+)
+def test_light_that_grows_beyond_half_precision_is_cut(bench: Bench, denoiser: str, names: list[str]) -> None:
+    """Four times the brightest that there is: in histories as in samples the limit is below the largest half."""
+    config = replace(bmfr(adaptive=True, gain=0.0), asvgf=Asvgf(gain=0.0))
+    for change in ((0, 1, 0, 1), (0, 1, 0, 1), (0.75, 1, 0.75, 1)):
+        images = bench.denoise(wall(SMALL, 32000.0, change), config, denoiser, keep=names)
+    for name in names:
+        assert 50000.0 < images[name][..., :3].max() <= 65024.0
 
 
 # ------------------------------------------------------------------------------------------------- the short history

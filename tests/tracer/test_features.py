@@ -19,7 +19,7 @@ from raytrace.load import load_scene
 from raytrace.punctual import PunctualLight
 from raytrace.scene import Scene
 from raytrace.shot import Shot
-from raytrace.tables import Variant
+from raytrace.tables import Variant, variant_of
 from tests.tracer.conftest import OpenTracer
 from tests.tracer.scenes import cornell, everything, glossy, rigid
 
@@ -128,7 +128,7 @@ def test_everything_is_counted() -> None:
 
 def test_a_feature_that_is_compiled_in_for_nothing_changes_no_bit() -> None:
     scene = compile_scene(cornell())
-    with Tracer(scene) as plain, Tracer(scene, Settings(also=("sky",))) as more:
+    with Tracer(scene) as plain, Tracer(scene, variant=variant_of(scene)._replace(sky=True)) as more:
         assert (plain.variant.sky, more.variant.sky) == (False, True)
         camera = scene.scene.camera
         one, other = (tracer.frame(3, camera, camera, SIZE) for tracer in (plain, more))

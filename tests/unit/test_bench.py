@@ -19,7 +19,7 @@ from bench import command, files, memory, methods, report, running, tracing
 from bench.cases import FRAMES, SCORED, Case, quality_case, quick_size, tracing_cases
 from bench.goals import GOALS
 from bench.machine import describe
-from bench.methods import METHODS, NOISY
+from bench.methods import METHODS, NOISY, Method
 from bench.references import Reference
 from bench.results import QualityResult, Report
 from bench.running import MethodResult, PassTime
@@ -413,6 +413,20 @@ def test_summaries_are_medians_and_percentiles():
         Summary.of([])
 
 
+def test_methods_get_the_frames_they_would_get_in_use(ctx, shot, monkeypatch):
+    """A-SVGF needs points that the tracer has remembered; nobody else pays for them."""
+    (adaptive,) = [method for method in METHODS if method.denoiser == "asvgf"]
+    rule = running.remembers(adaptive, CONFIG)
+    assert rule
+    assert running.remembers(NOISY, CONFIG) == running.remembers(methods.BMFR, CONFIG) == ""
+    monkeypatch.setattr(running, "trace", lambda shot: [shot.frame(index) for index in range(3)])
+    footage = running.Footage(shot)
+    assert all(packet.temporal_gradient is None for packet in footage())
+    assert all(packet.temporal_gradient is not None for packet in footage(rule))
+    assert footage(rule) is footage(rule)
+    assert shot.remember == ""
+
+
 def test_every_denoiser_is_measured_and_names_are_unique():
     assert {method.denoiser for method in METHODS} - {"oidn"} == set(DENOISERS) - {"reference"}
     names = [method.name for method in METHODS]
@@ -423,7 +437,8 @@ def test_every_denoiser_is_measured_and_names_are_unique():
 @pytest.mark.parametrize("method", [method for method in METHODS if method.stage], ids=lambda method: method.name)
 def test_a_variant_differs_from_its_method(method):
     """Or it would be measured twice and mean nothing."""
-    whole = methods.BMFR if method.denoiser == "bmfr" else methods.ONE_SIGNAL
+    known = {"bmfr": methods.BMFR, "svgf": methods.ONE_SIGNAL}
+    whole = known.get(method.denoiser, Method(method.denoiser, method.denoiser))
     assert method.configure(CONFIG) != whole.configure(CONFIG)
 
 

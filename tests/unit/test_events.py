@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 import assets
 from bench import events
 from raytrace.frame import MISS, FramePacket
+from raytrace.shot import FPS
 
 
 def packet(objects: np.ndarray, depth: np.ndarray, motion: tuple[float, float] = (0.0, 0.0)) -> FramePacket:
@@ -57,11 +57,9 @@ def test_a_step_to_the_side_looks_the_same_way():
     assert replace(moved, position=camera.position) == camera
 
 
-def test_a_dimmed_scene_has_a_quarter_of_the_light():
-    scene = assets.build("cornell")
-    dim = events.dimmed(scene)
-    for before, after in zip(scene.materials, dim.materials, strict=True):
-        assert after.emission == pytest.approx([events.DIMMED * channel for channel in before.emission])
-        assert after.base_color == before.base_color
-    sky = events.dimmed(replace(scene, sky=(1.0, 2.0, 4.0))).sky
-    assert sky == pytest.approx((0.25, 0.5, 1.0))
+def test_a_switched_lamp_gives_a_quarter_from_the_event_on():
+    scene = events.switched(assets.build("cornell"), 16)
+    (lamp,) = [material for material in scene.materials if material.emits]
+    assert lamp.dimmer is not None
+    assert [lamp.dimmer(index / FPS) for index in (0, 15, 16, 40)] == [1.0, 1.0, events.DIMMED, events.DIMMED]
+    assert all(material.dimmer is None for material in scene.materials if not material.emits)

@@ -1,7 +1,8 @@
 // One iteration of the à-trous wavelet that spreads the sparse gradients. Schied et al. 2018, sec. 4.3.
 //
 // STEP: distance of the taps, in strata. FIRST: the input comes from the tracer. JOINT: direct and indirect are one
-// signal. LIGHT: weigh luminance. Changes are filtered with their sign, so that what is left of their noise cancels.
+// signal. SIGMA_N_SQUARINGS: log2 of the normal exponent, or -1 where it is no power of two. Changes are filtered with
+// their sign, so that what is left of their noise cancels.
 
 #include "common/finite.glsl"
 
@@ -34,6 +35,16 @@ vec4 change_at(ivec2 q) {
     return c;
 }
 
+float normal_weight(float w) {
+    w = max(w, 0.0);
+#if SIGMA_N_SQUARINGS >= 0
+    for (int i = 0; i < SIGMA_N_SQUARINGS; ++i) w *= w;
+#else
+    w = pow(w, u_sigma_n);
+#endif
+    return w;
+}
+
 void main() {
     ivec2 p = ivec2(gl_FragCoord.xy), size = textureSize(in_change, 0);
     vec4 surface = texelFetch(in_surface, p, 0);
@@ -60,7 +71,7 @@ void main() {
         vec2 away = SIDE * vec2(d);
         float range = u_sigma_z * abs(dot(slope, away)) + floor_z * length(away) + 1e-30;
         float e = abs(surface.w - s.w) / range;
-        float w = (d.x == 0 ? 1.0 : 0.5) * (d.y == 0 ? 1.0 : 0.5) * pow(max(dot(surface.xyz, s.xyz), 0.0), u_sigma_n);
+        float w = (d.x == 0 ? 1.0 : 0.5) * (d.y == 0 ? 1.0 : 0.5) * normal_weight(dot(surface.xyz, s.xyz));
         vec2 both = vec2(e);
 #if HAS_IN_LIGHT
         both += abs(light.xz - texelFetch(in_light, q, 0).xz) * inverse_l;

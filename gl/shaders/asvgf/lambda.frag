@@ -4,7 +4,7 @@
 // by guides does (Kopf et al. 2007). Changes are summed up before they are divided: a stratum without light has no say.
 //
 // WIDEN: 1 takes the largest of 3x3 strata, whatever their surface. FOLLOW: 1 also tells by which factor the light has
-// changed.
+// changed. SIGMA_N_SQUARINGS: log2 of the normal exponent, or -1 where it is no power of two.
 
 #include "common/finite.glsl"
 
@@ -30,6 +30,16 @@ vec2 relative(vec4 c) {
     return clamp(c.xz / max(max(c.yw, SHARE_FLOOR * (c.y + c.w)), vec2(1e-30)), -1.0, 1.0);
 }
 
+float normal_weight(float w) {
+    w = max(w, 0.0);
+#if SIGMA_N_SQUARINGS >= 0
+    for (int i = 0; i < SIGMA_N_SQUARINGS; ++i) w *= w;
+#else
+    w = pow(w, u_sigma_n);
+#endif
+    return w;
+}
+
 void main() {
     ivec2 p = ivec2(gl_FragCoord.xy), size = textureSize(in_change, 0);
     vec4 surface = texelFetch(in_surface, p, 0);
@@ -48,7 +58,7 @@ void main() {
         vec2 away = abs(vec2(SIDE * q + 1 - p));
         // The sample of a stratum may lie a pixel from its centre.
         float range = u_sigma_z * dot(slope, away + 1.0) + floor_z * (length(away) + 1.0) + 1e-30;
-        float likeness = pow(max(dot(surface.xyz, s.xyz), 0.0), u_sigma_n) * exp(-abs(surface.w - s.w) / range);
+        float likeness = normal_weight(dot(surface.xyz, s.xyz)) * exp(-abs(surface.w - s.w) / range);
         vec2 near = max(1.0 - away / REACH, 0.0);
         sum += near.x * near.y * (sane_weight(likeness) + STRANGER) * c;
     }

@@ -111,7 +111,7 @@ void main() {
 #ifdef ADAPTIVE
         vec4 change = texelFetch(in_lambda, p, 0);
         float void_share = clamp(change.x, 0.0, 1.0);
-        color *= change.z;
+        color = clamp_radiance(color * change.z);
         share = mix(share, 1.0, void_share);
         history = max((history + 1.0) / (1.0 + void_share * history) - 1.0, 0.0);
 #endif

@@ -43,7 +43,7 @@ void main() {
     if (total > 0.0) {
         color /= total;
 #ifdef ADAPTIVE
-        color *= texelFetch(in_lambda, p, 0).z; // the history's length has been cut already
+        color = clamp_radiance(color * texelFetch(in_lambda, p, 0).z); // the history's length has been cut already
 #endif
         c = mix(color, c, max(1.0 / (found.w + 1.0), u_alpha));
     }

@@ -78,5 +78,5 @@ void main() {
     sum = own.a * own.rgb;
     weight = own.a;
     if (is_surface(surface)) add_taps();
-    out_color = weight > 0.0 ? round_to_half(vec4(sum / weight, 1.0)) : vec4(0.0);
+    out_color = weight > 0.0 ? round_to_half(vec4(sum / weight, 1.0)) : vec4(own.rgb, 0.0);
 }

@@ -26,5 +26,5 @@ void main() {
             vec3 off = (c.rgb - own.rgb) * scale;
             add(c, gaussian(d, u_sigma_d) * exp(-0.5 * dot(off, off)));
         }
-    write_mean();
+    write_mean(own.rgb);
 }

@@ -6,6 +6,9 @@
 
 uniform sampler2D in_color;   // rgb, how much of it there is
 uniform sampler2D in_surface; // normal, depth
+#if HAS_IN_SAMPLE
+uniform sampler2D in_sample;
+#endif
 uniform int u_radius;
 uniform float u_sigma_d;
 
@@ -20,5 +23,9 @@ void main() {
             possible += w;
             if (inside(p + d)) add(texelFetch(in_color, p + d, 0), w);
         }
-    write_mean();
+#if HAS_IN_SAMPLE
+    write_mean(texelFetch(in_sample, p, 0).rgb);
+#else
+    write_mean(texelFetch(in_color, p, 0).rgb);
+#endif
 }

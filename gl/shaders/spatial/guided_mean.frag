@@ -12,6 +12,9 @@ uniform sampler2D in_green;
 uniform sampler2D in_blue;
 uniform sampler2D in_color; // what the function says there; a: number of windows
 uniform sampler2D in_surface;
+#if HAS_IN_SAMPLE
+uniform sampler2D in_sample;
+#endif
 uniform int u_radius;
 
 layout(location = 0) out vec4 out_color;
@@ -47,6 +50,7 @@ void main() {
     out_color = color;
 #else
     bool there = color.a > 0.0 && is_surface(texelFetch(in_surface, p, 0));
-    out_color = there ? round_to_half(vec4(clamp_radiance(color.rgb), 1.0)) : vec4(0.0);
+    vec4 own = vec4(texelFetch(in_sample, p, 0).rgb, 0.0);
+    out_color = there ? round_to_half(vec4(clamp_radiance(color.rgb), 1.0)) : own;
 #endif
 }

@@ -32,5 +32,5 @@ void main() {
                 );
             add(texelFetch(in_color, p + d, 0), sane_weight(w));
         }
-    write_mean();
+    write_mean(texelFetch(in_color, p, 0).rgb);
 }

@@ -26,6 +26,7 @@ void main() {
 #if HAS_IN_ALBEDO
     c *= texelFetch(in_albedo, p, 0).rgb;
 #endif
-    bool there = is_finite(c) && is_surface(texelFetch(in_surface, p, 0));
-    out_color = there ? round_to_half(vec4(clamp_radiance(c), 1.0)) : vec4(0.0);
+    bool there = is_surface(texelFetch(in_surface, p, 0));
+    // A sample on no surface, or on one whose guides are not finite, takes no part, but it is not lost.
+    out_color = is_finite(c) ? round_to_half(vec4(clamp_radiance(c), there ? 1.0 : 0.0)) : vec4(0.0);
 }

@@ -27,7 +27,8 @@ void add(vec4 c, float w) {
 }
 
 // Of the row's mean the column counts as much as there was of the row: two passes are exactly the whole square where
-// weights are products, whatever pixels have no sample. A pixel without any in its window stays black.
-void write_mean() {
-    out_color = weight > 0.0 ? round_to_half(vec4(sum / weight, AXIS == 1 ? weight / possible : 1.0)) : vec4(0.0);
+// weights are products, whatever pixels have no sample. A pixel without any in its window stays as it is.
+void write_mean(vec3 own) {
+    vec4 mean = vec4(sum / weight, AXIS == 1 ? weight / possible : 1.0);
+    out_color = weight > 0.0 ? round_to_half(mean) : vec4(own, 0.0);
 }

@@ -1,10 +1,11 @@
 // Blend this frame's sample with the history found by temporal/reproject.frag, and the luminance moments with it.
 //
 // Schied et al. 2017, sec. 4.1 and 4.2: C' = a·C + (1 - a)·C'_prev, moments likewise. HALF: the colour's precision.
-// CLAMPED: the history's colour is first brought within the bounds of temporal/neighbourhood.frag. ADAPTIVE: where light
-// has changed, the history counts for less (Schied et al. 2018, sec. 4.4); SIGNAL: which channel of λ tells it; POWER: its
-// length becomes N (1 - λ)^u_power, otherwise that of a mean in which the new sample has the weight it gets. CENTRED: the
-// second moment is that about the mean (Welford 1962). UNBIASED: h / (h - 1) of it is the variance, Bessel's correction.
+// CLAMPED: the history's colour is first brought within the bounds of temporal/neighbourhood.frag. ADAPTIVE: where
+// light has changed, the history follows it and counts for less (Schied et al. 2018, sec. 4.4); SIGNAL: which channel
+// of λ tells it; POWER: its length becomes N (1 - λ)^u_power, otherwise that of a mean in which the new sample has the
+// weight it gets. CENTRED: the second moment is that about the mean (Welford 1962). UNBIASED: h / (h - 1) of it is the
+// variance, Bessel's correction.
 
 #include "common/color.glsl"
 #include "common/finite.glsl"
@@ -12,13 +13,13 @@
 uniform sampler2D in_color;
 uniform sampler2D in_reprojection;
 uniform sampler2D prev_color;   // rgb, standard deviation
-uniform sampler2D prev_moments; // first and second luminance moment; ADAPTIVE: z: part of the history's length that was left
+uniform sampler2D prev_moments; // first and second luminance moment; z: what was left of the length, if ADAPTIVE
 #ifdef CLAMPED
 uniform sampler2D in_low;
 uniform sampler2D in_high;
 #endif
 #ifdef ADAPTIVE
-uniform sampler2D in_lambda;
+uniform sampler2D in_lambda; // xy: λ of direct and indirect light; zw: factors by which they have changed
 uniform float u_power;
 #endif
 uniform bool u_history_valid;
@@ -115,7 +116,7 @@ void main() {
         void_share = clamp(change[SIGNAL], 0.0, 1.0);
         // What was seen in other light, as it would be in this one.
         float factor = change[2 + SIGNAL];
-        color *= factor;
+        color = clamp_radiance(color * factor);
         moments *= vec2(factor, factor * factor);
 #if POWER
         n *= pow(max(1.0 - void_share, 1e-9), u_power); // pow(0, 0) is undefined

@@ -58,5 +58,5 @@ void main() {
         // A plain running mean until the new one's share has fallen to alpha, exponential from then on.
         c = vec4(c.a > 0.0 ? mix(color, c.rgb, max(1.0 / (found.w + 1.0), u_alpha)) : color, 1.0);
     }
-    out_color = c.a > 0.0 ? round_to_half(vec4(c.rgb, 1.0)) : vec4(0.0);
+    out_color = round_to_half(c);
 }
