@@ -11,6 +11,7 @@ import config
 import doctor
 import headless
 from bench import command as bench
+from bench.recording import live
 from gl.pipelines import DENOISERS, FrameTraits, build
 from tests.cli.runner import App
 from ui import window
@@ -86,6 +87,7 @@ def test_with_a_display_there_is_a_window(app: App, monkeypatch: pytest.MonkeyPa
         hud=True,
         calibrate=True,
         log=False,
+        recorder=live.new_recorder,
     )
     asked = window.Wishes(
         scene="interior",
@@ -96,6 +98,7 @@ def test_with_a_display_there_is_a_window(app: App, monkeypatch: pytest.MonkeyPa
         hud=False,
         calibrate=False,
         log=True,
+        recorder=live.new_recorder,
     )
     assert calls == [(0, default), (3, asked)]
 
