@@ -40,6 +40,7 @@ SCENES = {
 }
 ALL_IMAGES = images_of(Variant(*(True for _ in Variant._fields)), positions=True, gradients=True)
 GLOSS = {"specular", "specular_albedo"}
+SURFACES = ("specular", "glossmap", "bumps", "colored")
 any_scene = pytest.mark.parametrize("what", SCENES.values(), ids=SCENES.keys())
 
 
@@ -95,11 +96,15 @@ def test_kernels_contain_what_the_scene_needs(trace: OpenTracer, what: Scene) ->
         "environment": variant.environment,
         "moving": variant.moving,
         "positions": tracer.settings.positions,
-        "specular": variant.specular,
+        **{name: getattr(variant, name) for name in SURFACES},
     }
-    kinds = {name: getattr(variant, name) for name in ("textured", "lamps", "punctual", "environment")}
-    masking = {"separable": False} if variant.specular else {}
-    assert first == second == kinds | {"has_sky": variant.sky} | masking
+    lights = {name: getattr(variant, name) for name in ("textured", "lamps", "punctual", "environment")}
+    lights["has_sky"] = variant.sky
+    if variant.specular:
+        assert first == second == lights | {name: getattr(variant, name) for name in SURFACES} | {"separable": False}
+    else:  # the first hit of a diffuse surface asks for no colour
+        assert first == lights
+        assert second == lights | {"colored": variant.colored}
 
 
 def test_everything_is_counted() -> None:

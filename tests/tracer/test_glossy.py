@@ -246,3 +246,12 @@ def test_colours_of_vertices_are_factors_of_the_base_colour(trace: OpenTracer) -
     np.testing.assert_allclose(frame.albedo[..., 0], 0.8 * (x + 1) / 2 * share, atol=0.01)
     np.testing.assert_allclose(frame.albedo[..., 1], 0.2 * share, atol=0.01)
     np.testing.assert_allclose(frame.albedo[..., 2], 0.4 * share, atol=0.01)
+
+
+def test_a_frame_is_the_same_for_any_tiling_and_number_of_threads(trace: OpenTracer) -> None:
+    frames = [still(trace(glossy(), **how), (24, 16)) for how in ({"tile": 96}, {"threads": 2, "tile": 192}, {})]
+    for name in ("direct", "indirect", "specular", "albedo", "specular_albedo", "surface"):
+        first, *others = (getattr(frame, name) for frame in frames)
+        assert np.isfinite(first).all()
+        for other in others:
+            np.testing.assert_array_equal(first, other)
