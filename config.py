@@ -107,11 +107,18 @@ class Svgf(Section):
     )
     sigma_z: float = param(1.0, 0.01, 100, "[0.01;100] tolerance for depth, in depth slopes of the surface")
     sigma_n: int = param(128, 1, 1024, "[1;1024] exponent of the cosine between normals; more: sharper")
+    normal_history: int = param(
+        0,
+        0,
+        255,
+        "[0;255] frames in which that exponent grows from 1, with the history; 0: it does not",
+        structural=True,
+    )
     sigma_l: float = param(4.0, 0.01, 1000, "[0.01;1000] tolerance for luminance, in standard deviations of the noise")
     first_sigma_l: float = param(4.0, 0.1, 1000, "[0.1;1000] sigma_l of the first iteration, in sigma_l of the others")
     sigma_r: float = param(0.1, 0.001, 100, "[0.001;100] tolerance for roughness, of specular light only")
     reach: float = param(
-        30.0, 1, 1e6, "[1;1000000] distance over which specular light is averaged, pixels per squared roughness"
+        15.0, 1, 1e6, "[1;1000000] distance over which specular light is averaged, pixels per squared roughness"
     )
 
     @property
@@ -164,7 +171,7 @@ class Bmfr(Section):
     preset: str = param(
         "best", choices=("paper", "reference", "best"), doc="values for the keys of this section that are not set"
     )
-    separate: bool = param(True, doc="fit diffuse and specular light apart", structural=True)
+    separate: bool = param(False, doc="fit diffuse and specular light apart", structural=True)
     demodulate: bool = param(True, doc="fit illumination, without the surfaces' albedo", structural=True)
     temporal: bool = param(True, doc="accumulate over time, samples and fits", structural=True, heading="accumulation")
     max_history: int = param(255, 10, 255, "[10;255] longest history counted, in frames")

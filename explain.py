@@ -138,18 +138,29 @@ def scene_section(subject: Subject) -> list[str]:
             f"{around.name}, {_by(content.environment_size)} texels, {content.environment_bytes:,} bytes; {share}"
         )
     punctual = ", ".join(f"{count} {kind}" for kind, count in content.punctual.items()) or "none"
+    carried = sum(light.motion is not None for light in subject.scene.scene.lights)
+    moving = f"; {carried} of them {'moves' if carried == 1 else 'move'}" if carried else ""
     flat = content.triangles - content.smooth
     rows = [
         ("triangles", f"{content.triangles:,} in {_count(content.objects, 'object')}; {motion}"),
         ("textures", textures),
         ("lamps", lamps if content.lamps else "none"),
-        ("lights", f"{punctual} without a surface" if content.punctual else "none without a surface"),
+        ("lights", f"{punctual} without a surface{moving}" if content.punctual else "none without a surface"),
         ("sky", sky),
         ("environment", environment),
+        ("camera", _cameras(subject.scene.scene)),
         ("normals", f"the vertices' on {_count(content.smooth, 'triangle')}, the face's on {flat:,}"),
         ("tables", f"{content.table_bytes:,} bytes of main memory, all that the kernels read"),
     ]
     return [f"scene {subject.scene.scene.name}", *_columns(rows)]
+
+
+def _cameras(scene: Scene) -> str:
+    """Those that can be asked for, and what moves of them."""
+    names = [f"{camera.name!r}{' (moves)' if camera.flight else ''}" for camera in scene.cameras]
+    listing = ", ".join(names) if len(names) <= _FEW else f"{len(names)} by name"
+    words = [listing] if names else []
+    return "; ".join([*words, "a flight" if scene.flight else "no flight"])
 
 
 def tracer_section(subject: Subject) -> list[str]:

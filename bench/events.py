@@ -49,7 +49,8 @@ _DEPTH = 0.02  # share of the depth by which a point seen before may differ and 
 @dataclass(frozen=True)
 class EventResult:
     """One method: ``flicker``, mean standard deviation over time on the display curve; ``errors`` from the event on,
-    by its name; ``recovery``: frames until they are within 10 % of ``steady``, their value in the end."""
+    by its name; ``recovery``: frames until they are within 10 % of ``steady``, their value in the end;
+    None: longer than was looked."""
 
     name: str
     group: str
@@ -57,7 +58,7 @@ class EventResult:
     flicker: float
     errors: dict[str, tuple[float, ...]]
     steady: dict[str, float]
-    recovery: dict[str, int]
+    recovery: dict[str, int | None]
 
 
 @dataclass(frozen=True)

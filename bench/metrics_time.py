@@ -49,15 +49,21 @@ def steady(errors: Sequence[float]) -> float:
     """Median of the last quarter of ``errors``. Raises ValueError for none."""
     if not errors:
         raise ValueError("no error, no steady value")
-    count = max(1, round(TAIL * len(errors)))
-    return float(np.median(errors[-count:]))
+    return float(np.median(errors[-_tail(errors) :]))
 
 
-def recovery(errors: Sequence[float]) -> int:
+def _tail(errors: Sequence[float]) -> int:
+    return max(1, round(TAIL * len(errors)))
+
+
+def recovery(errors: Sequence[float]) -> int | None:
     """Frames after an event until the error is within 10 % of its steady value; 0: from the first frame on.
+
+    None: not before the last quarter, whose median is then no steady value: it takes longer than was looked.
 
     ``errors``: of the frames from the event on, long enough for the last quarter to be steady. A single frame above the
     limit later on, as noise has it, does not count against the method.
     """
     limit = (1.0 + TOLERANCE) * steady(errors)
-    return next(index for index, error in enumerate(errors) if error <= limit)
+    first = next(index for index, error in enumerate(errors) if error <= limit)
+    return first if first < max(1, len(errors) - _tail(errors)) else None

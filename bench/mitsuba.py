@@ -2,7 +2,7 @@
 
     .venv/bin/python -m bench.mitsuba
 
-Needs the package ``mitsuba``, which the program itself does not, and an LLVM library for it (Debian: libllvm). Frames
+Needs the package ``mitsuba``, one of the tests' own, and an LLVM library for it (Debian: libllvm). Frames
 of the two are traced in turn, and the ratio is that of the medians, of wall and of processor time; the latter is hardly
 disturbed by other programs. Mitsuba's integrator is ``path`` with ``max_depth`` 3 and no Russian roulette: as ours, two
 surfaces, a light sample and a bounce ray at each (ours has no bounce ray at the second). Ours makes the guides and
@@ -11,6 +11,7 @@ motion vectors besides, and keeps direct and indirect light apart.
 
 from __future__ import annotations
 
+import argparse
 import importlib
 import math
 import sys
@@ -57,7 +58,7 @@ def load_mitsuba() -> Any:
         mi.set_variant(VARIANT)
         mi.Float(1.0) + 1.0
     except ImportError as error:
-        raise UserError(f"Mitsuba is not there ({error})", "install it: .venv/bin/pip install mitsuba") from error
+        raise UserError(f"Mitsuba is not there ({error})", "make test installs it") from error
     except Exception as error:  # without an LLVM library it raises a RuntimeError of its own
         raise UserError(f"Mitsuba cannot use {VARIANT} ({error})", "install Debian's libllvm") from error
     return mi
@@ -161,8 +162,15 @@ def _now() -> tuple[float, float]:
     return time.perf_counter(), time.process_time()
 
 
+def build_parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser("bench.mitsuba", description="time of tracing beside Mitsuba 3")
+    parser.add_argument("--repeats", type=int, default=14, help="frames of each that count (default 14)")
+    return parser
+
+
 def main() -> int:
     """A table on stdout."""
+    repeats = max(1, build_parser().parse_args().repeats)
     try:
         mi = load_mitsuba()
     except UserError as error:
@@ -170,7 +178,7 @@ def main() -> int:
         return 2
     print(f"{SIZE[0]}x{SIZE[1]}, one path per pixel, Mitsuba {mi.__version__} {VARIANT}")
     for name in SCENES:
-        row = compare(name, mi)
+        row = compare(name, mi, repeats=repeats)
         print(
             f"  {name:9s} ours {row.ours[0]:.1f} ms, Mitsuba {row.theirs[0]:.1f} ms, ratio {row.ratios[0]:.2f}; "
             f"processor {row.ours[1]:.1f} and {row.theirs[1]:.1f} ms, ratio {row.ratios[1]:.2f}; "

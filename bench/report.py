@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from bench.claims import claims
-from bench.events import EventsResult
+from bench.events import EventResult, EventsResult
 from bench.goals import GOALS
 from bench.methods import APART_TAA, BMFR_TAA, METHODS, ONE_SIGNAL_TAA
+from bench.metrics_time import TAIL
 from bench.oidn import INSTALL
 from bench.results import QualityResult, Report, contenders
 from bench.running import available
@@ -112,10 +113,11 @@ def error_table(result: QualityResult) -> str:
 def events_table(result: EventsResult) -> str:
     """Flicker, and frames until an event is over."""
     names = list(result.noise)
-    rows = [
-        (m.name, f"{m.flicker:.4f}", *(cell for n in names for cell in (f"{m.recovery[n]}", f"{m.steady[n]:.4f}")))
-        for m in result.methods
-    ]
+
+    def cells(m: EventResult) -> list[str]:
+        return [cell for n in names for cell in (_frames(m.recovery[n], len(m.errors[n])), f"{m.steady[n]:.4f}")]
+
+    rows = [(m.name, f"{m.flicker:.4f}", *cells(m)) for m in result.methods]
     rows.append(("noise of the reference", "", *(cell for n in names for cell in ("", f"{result.noise[n]:.4f}"))))
     heads = (
         f"{result.scene}, {result.size[0]}x{result.size[1]}, at rest: flicker",
@@ -129,6 +131,10 @@ def claims_table(result: QualityResult) -> str:
     """What the filters are meant to be worth, and whether they are."""
     rows = [(f"{c.method}: {c.what}", c.value, c.limit, "holds" if c.holds else "does not") for c in claims(result)]
     return table((f"{result.scene}, claimed", "measured", "at least", ""), rows) if rows else ""
+
+
+def _frames(count: int | None, looked: int) -> str:
+    return f"> {round((1.0 - TAIL) * looked)}" if count is None else str(count)
 
 
 def passes_table(result: QualityResult) -> str:

@@ -8,6 +8,7 @@ alike. Ratios are those of processor time, of all threads together, which other 
 
 from __future__ import annotations
 
+import argparse
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -133,13 +134,22 @@ def table(title: str, rows: Sequence[Row], relative: str) -> str:
     return "\n".join(lines)
 
 
+def build_parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        "bench.scaling", description="how tracing grows with pixels, triangles and threads"
+    )
+    parser.add_argument("--repeats", type=int, default=7, help="frames of each that count (default 7)")
+    return parser
+
+
 def main() -> int:
     """All tables, on stdout."""
+    repeats = max(1, build_parser().parse_args().repeats)
     try:
         interior = assets.build("interior")
-        print(table("interior by size", by_size(interior), "per pixel, relative"), flush=True)
-        print(table("\nterrain by triangles, 640x360", by_triangles(), "relative"), flush=True)
-        print(table("\ninterior by threads, 640x360", by_threads(interior), "relative"), flush=True)
+        print(table("interior by size", by_size(interior, repeats=repeats), "per pixel, relative"), flush=True)
+        print(table("\nterrain by triangles, 640x360", by_triangles(repeats=repeats), "relative"), flush=True)
+        print(table("\ninterior by threads, 640x360", by_threads(interior, repeats=repeats), "relative"), flush=True)
     except UserError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2

@@ -8,6 +8,7 @@ from typing import Final, Protocol
 
 import numpy as np
 
+from gl.pipelines import remembered
 from raytrace.camera import Camera
 from raytrace.frame import FramePacket
 from raytrace.shot import FPS
@@ -30,6 +31,7 @@ _CAMERA: Final = "recorded frames: the camera goes as it went"
 _REFUSALS: Final = {
     Action.FLY: _CAMERA,
     Action.RESET_CAMERA: _CAMERA,
+    Action.PATH: _CAMERA,
     Action.JITTER: "recorded frames: the jitter is what it was",
     Action.RESOLUTION: "recorded frames: they have one size",
     Action.RECORD: "these frames are recorded already",
@@ -162,7 +164,15 @@ class Playback:
         elif not settled or state.reset or state.screenshot or wanted != self._settled:
             self._again = True
         if settled:
+            self._tell_of_gradients(state)
             self._settled = wanted
+
+    def _tell_of_gradients(self, state: State) -> None:
+        """Say so where a method that wants to know where light changes is shown on frames that do not tell."""
+        new = not self._settled or self._settled[0] != state.denoiser
+        packet = self._packet
+        if new and packet and packet.temporal_gradient is None and remembered(state.config, state.denoiser):
+            state.tell("no gradients were recorded: light counts as unchanged")
 
     def take(self) -> FramePacket | None:
         if self._again:

@@ -9,7 +9,10 @@ from ui.state import UNFILTERED, State
 from ui.status import Status
 
 _PARAMETERS: Final = (Action.NEXT, Action.STAGE, Action.COUNT)
-_OTHERS: Final = (Action.JITTER, Action.FLIP, Action.ANIMATE, Action.VIEW, Action.RESOLUTION, Action.RECORD)
+_OTHERS: Final = (
+    *(Action.JITTER, Action.FLIP, Action.ANIMATE, Action.VIEW, Action.RESOLUTION),
+    *(Action.PATH, Action.RECORD),
+)
 _NAMELESS: Final = ("enabled", "mode")
 """Parameters that go by the name of their section."""
 
@@ -79,6 +82,8 @@ def _value(binding: Binding, state: State, status: Status) -> str | bool | None:
             return state.animate
         case Action.VIEW:
             return state.view or "picture"
+        case Action.PATH:
+            return state.path
         case Action.RECORD:
             return state.recording
         case Action.RESOLUTION:

@@ -83,7 +83,7 @@ function drawEventsTable(events, names) {
     { head: "method", value: (r) => r.name, cell: named },
     { head: "flicker at rest", value: (r) => r.flicker, text: (r) => fixed(r.flicker, 4) },
     ...names.flatMap((name) => [
-      { head: `frames after ${name}`, value: (r) => (r.last ? null : r.recovery[name]), text: (r) => (r.last ? "" : String(r.recovery[name])) },
+      { head: `frames after ${name}`, value: (r) => (r.last ? null : r.recovery[name]), text: (r) => (r.last ? "" : r.recovery[name] === null ? `> ${Math.round(0.75 * r.errors[name].length)}` : String(r.recovery[name])) },
       { head: "steady RMSE", value: (r) => r.steady[name], text: (r) => fixed(r.steady[name], 4) },
     ]),
   ];

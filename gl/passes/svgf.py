@@ -13,6 +13,8 @@ Deviations from the paper, in every preset:
   after the first iteration. Before that, inside the feedback loop, a tight luminance weight makes pixels shun the rare
   bright samples of their neighbours frame after frame, and the picture darkens (1.7 % on the back wall of the Cornell
   box): ``first_sigma_l`` loosens it there.
+* ``normal_history``, after Q2RTX: the exponent of the normals' weight grows with the history. Where surfaces are small
+  and bent no neighbour faces quite the same way, and a pixel without a history would keep its noise.
 * What travels between the iterations is the standard deviation, since a variance leaves the range of half precision.
 
 The preset ``reference`` has the constants of the best-known implementation, the pass SVGFPass of NVIDIA's Falcor. It
@@ -35,7 +37,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Final
 
 from config import Svgf
 from gl.graph import FragmentPass, Graph, In, Out, Tex, Uniform
@@ -59,22 +61,28 @@ class Atrous(FragmentPass):
     u_sigma_l = Uniform("float", "> 0, luminance edge-stopping in standard deviations")
     u_pixel_size = Uniform("float", "> 0, scene units a pixel is wide at depth 1")
 
-    def __init__(self, p: Svgf, step: int, pixel_size: float, raw: bool = False, glossy: bool = False) -> None:
-        gloss: dict[str, Any] = {"u_sigma_r": p.sigma_r, "u_reach": p.reach} if glossy else {}
+    def __init__(self, p: Svgf, step: int, pixel_size: float, raw: bool = False) -> None:
+        declared = self.ports.uniforms
+        extra: dict[str, Any] = {}
+        if "u_sigma_r" in declared:
+            extra |= {"u_sigma_r": p.sigma_r, "u_reach": p.reach}
+        if "u_normal_history" in declared:
+            extra["u_normal_history"] = float(p.normal_history)
         super().__init__(
             defines={
                 "STEP": step,
                 "SIGMA_N_SQUARINGS": squarings(p.sigma_n),
                 "LUMINANCE_STOP": int(p.variance_guided),
                 "RAW": int(raw),
-                **(GLOSSY if glossy else {}),
+                **(GLOSSY if "u_sigma_r" in extra else {}),
+                **({"GROWING": 1} if "u_normal_history" in extra else {}),
             },
             u_accumulated_variance=p.alpha / (2.0 - p.alpha),
             u_sigma_z=p.sigma_z,
             u_sigma_n=float(p.sigma_n),
             u_sigma_l=p.sigma_l * (p.first_sigma_l if step == 1 else 1.0),
             u_pixel_size=pixel_size,
-            **gloss,
+            **extra,
         )
 
 
@@ -89,8 +97,16 @@ class GlossyAtrous(Atrous):
     u_sigma_r = Uniform("float", "> 0, roughness edge-stopping")
     u_reach = Uniform("float", "> 0, pixels per squared roughness")
 
-    def __init__(self, p: Svgf, step: int, pixel_size: float, raw: bool = False) -> None:
-        super().__init__(p, step, pixel_size, raw, glossy=True)
+
+class AtrousGrowing(Atrous):
+    """The same, but the exponent of the normals' cosine grows with the history."""
+
+    in_length = In("w: length N of the history, frames")
+    u_normal_history = Uniform("float", "> 0, frames until the exponent is u_sigma_n")
+
+
+class GlossyAtrousGrowing(AtrousGrowing, GlossyAtrous):
+    """Both."""
 
 
 def squarings(exponent: int) -> int:
@@ -145,10 +161,13 @@ def _filter_signal(
     unfiltered, x, length = estimate(g, noisy, reprojection, history, guides, p, pixel_size, change, gloss)
     if history is not None and p.feedback < 0:
         g.feed(history, unfiltered)
-    atrous = Atrous if gloss is None else GlossyAtrous
+    growing = p.normal_history > 0 and length is not None
+    atrous = _WAVELETS[growing, gloss is not None]
     shape = {"in_surface": guides.surface, "in_gradient": guides.gradient}
     if gloss is not None:
         shape["in_specular_albedo"] = gloss
+    if growing and length is not None:
+        shape["in_length"] = length
     mean: dict[str, Tex] = {}
     if length is not None and p.variance_guided and p.accumulated_variance:
         mean = {"in_reprojection": length}
@@ -158,3 +177,12 @@ def _filter_signal(
         if history is not None and i == p.feedback:
             g.feed(history, x)  # no copy: x is written into the history's other half
     return x
+
+
+_WAVELETS: Final[dict[tuple[bool, bool], type[Atrous]]] = {
+    (False, False): Atrous,
+    (False, True): GlossyAtrous,
+    (True, False): AtrousGrowing,
+    (True, True): GlossyAtrousGrowing,
+}
+"""By whether the weight of normals grows with the history, and whether the light is specular."""

@@ -12,6 +12,7 @@ import moderngl
 import numpy as np
 import pytest
 
+import cli
 from bench.hard import cases, over_time, variance
 from bench.hard.stage import Row, Stage, deviation, recovery, worst
 from gl.renderer import Renderer
@@ -152,3 +153,15 @@ def test_recovery_counts_frames_until_the_error_stays_small() -> None:
     assert recovery([1.0, 0.0], 0.1) == 2
     assert recovery([0.0, 1.0, 0.0], 0.1) == 3
     assert recovery([math.nan, 0.0], 0.1) == 2
+
+
+@pytest.mark.gl
+def test_the_command_prints_and_writes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(cases, "measure", lambda renderer: {"group": [ROW, replace(ROW, error=2.0)]})
+    cases.run(tmp_path / "new" / "hard.json")
+    told = capsys.readouterr().out
+    assert "1 of 2 cases beyond their bounds" in told
+    assert [row["passed"] for row in json.loads((tmp_path / "new" / "hard.json").read_text())] == [True, False]
+    assert cli.parse(["bench", "--hard"]).hard

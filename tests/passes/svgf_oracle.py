@@ -242,6 +242,9 @@ class Oracle:
         blurred = np.sum([blur[y, x] * padded[y : y + height, x : x + width] for y, x in np.ndindex(3, 3)], axis=0)
         tolerance = p.sigma_l * (p.first_sigma_l if number == 0 else 1.0)
         reach = tolerance * np.sqrt(blurred) + 1e-6
+        exponent = np.full(length.shape, float(p.sigma_n))
+        if p.normal_history:
+            exponent = np.maximum(exponent * np.minimum(length / p.normal_history, 1.0), 1.0)
         spline = np.array([1, 4, 6, 4, 1]) / 16
         # The centre counts in full, whatever its surface.
         total = np.full(deviation.shape, spline[2] ** 2)
@@ -251,7 +254,7 @@ class Oracle:
             if (i, j) == (2, 2):
                 continue
             x, y, w_z, cosine = self._neighbour(packet, (i - 2) * step, (j - 2) * step)
-            weight = spline[i] * spline[j] * w_z * cosine**p.sigma_n
+            weight = spline[i] * spline[j] * w_z * cosine**exponent
             if p.variance_guided:
                 weight = weight * np.exp(-np.abs(gather(luminance, x, y)[0] - luminance) / reach)
             result += weight[..., None] * gather(color, x, y)[0]

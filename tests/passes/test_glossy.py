@@ -23,7 +23,7 @@ METHODS: list[tuple[str, tuple[str, ...]]] = [
     ("svgf", ("svgf.demodulate=false",)),
     ("svgf", ("svgf.separate=false", "svgf.demodulate=false")),
     ("bmfr", ()),
-    ("bmfr", ("bmfr.separate=false",)),
+    ("bmfr", ("bmfr.separate=true",)),
     ("bmfr", ("bmfr.demodulate=false",)),
     ("bmfr", ('bmfr.features="1,n,w,roughness"',)),
 ]
@@ -95,12 +95,23 @@ def test_specular_light_does_not_cross_into_another_roughness(bench: Bench, sett
     mean = np.array([0.0, 1.0, 10.0])[field]
     roughness, albedo = np.array([1.0, 0.1, 0.9])[field], np.array([0.0, 0.5, 0.5])[field]
     packets = [glossy(frame(SIZE), noise(SIZE, k) * mean[..., None], albedo, roughness) for k in range(4)]
-    loose = ("svgf.sigma_l=1000", *settings)
+    loose = ("svgf.sigma_l=1000", "svgf.reach=1000000", *settings)
     kept = denoised(bench, *packets, denoiser="svgf", settings=loose)["radiance"][..., 0]
     mixed = denoised(bench, *packets, denoiser="svgf", settings=(*loose, "svgf.sigma_r=100"))["radiance"][..., 0]
     column = slice(width, width + 4)
     assert kept[:, column].mean() == pytest.approx(0.5, rel=0.2)
     assert mixed[:, width + 8 : 2 * width].mean() > 1.2 * kept[:, width + 8 : 2 * width].mean()
+
+
+def test_a_narrow_lobe_is_averaged_over_fewer_pixels(bench: Bench) -> None:
+    """The noise left by the filter in space falls with the roughness, from all of it to next to nothing."""
+    left = []
+    for roughness in (0.05, 0.3, 1.0):
+        packet = glossy(frame(SIZE), noise(SIZE, 3), 0.5, roughness)
+        settings = ("svgf.temporal=false", "svgf.sigma_l=1000")
+        left.append(float(denoised(bench, packet, denoiser="svgf", settings=settings)["radiance"][8:-8, 8:-8, 0].std()))
+    assert left[0] > 0.3  # of 0.5
+    assert left[0] > 2 * left[1] > 4 * left[2]
 
 
 def test_roughness_is_a_feature_of_the_fit(bench: Bench) -> None:
@@ -109,7 +120,7 @@ def test_roughness_is_a_feature_of_the_fit(bench: Bench) -> None:
     packet = glossy(frame(SIZE), 3.0 * stripes, 0.5, stripes)
     error = {}
     for features in ("1,n,w,w2", "1,n,w,w2,roughness"):
-        settings = (f'bmfr.features="{features}"', "bmfr.regularization=rank")
+        settings = (f'bmfr.features="{features}"', "bmfr.regularization=rank", "bmfr.separate=true")
         radiance = denoised(bench, packet, denoiser="bmfr", settings=settings)["radiance"][..., :3]
         error[features] = float(np.abs(radiance - packet.radiance()).max())
     assert error["1,n,w,w2"] > 0.2

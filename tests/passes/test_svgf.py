@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from tests.passes.harness import (
     Bench,
     Size,
     atrous,
+    columns,
     frame,
     noise,
     signal,
@@ -344,3 +346,26 @@ def test_history_shortens_the_exaggeration_and_four_frames_end_it(bench: Bench) 
         h = history + 1
         expected = windows.std(axis=(2, 3)) * np.sqrt(4 / h) if h < 4 else 0.25
         np.testing.assert_allclose(result, np.broadcast_to(expected, result.shape), rtol=2 * HALF)
+
+
+def test_normals_count_the_more_the_longer_the_history(bench: Bench) -> None:
+    """Ridges whose sides face 20 degrees apart, each lit in its own way: mixed at first, apart in the end."""
+    size, frames = (31, 33), 12
+    side = np.arange(size[0]) % 2
+    normal = np.where(columns(size, side)[..., None] > 0, (0.17, 0.0, 0.985), (-0.17, 0.0, 0.985))
+    packet = frame(size, direct=columns(size, side), normal=normal)
+
+    def contrast(image: NDArray[np.float32]) -> float:
+        return float(image[16, 15, 0] - image[16, 14, 0])
+
+    def sequence(**changes: object) -> list[float]:
+        bench.restart()
+        p = Svgf(separate=False, variance_guided=False, feedback_level=-1, iterations=2, **changes)  # type: ignore[arg-type]
+        return [contrast(bench.denoise(packet, Config(svgf=p))["radiance"]) for _ in range(frames)]
+
+    at_once, growing = sequence(), sequence(normal_history=8)
+    np.testing.assert_allclose(at_once, 1.0, atol=0.02)
+    assert growing[0] < 0.7
+    assert all(now >= before - 1e-3 for before, now in pairwise(growing))
+    # From the eighth frame on it is as sharp as the exponent says.
+    np.testing.assert_allclose(growing[7:], at_once[7:], atol=2e-3)

@@ -39,8 +39,20 @@ def difference(image: NDArray[np.float32], expected: NDArray[np.float64], packet
         Svgf(separate=False, prefilter=True, feedback_level=-1),
         Svgf(separate=False, color_clamp=True),
         Svgf(separate=False, color_clamp=True, color_clamp_sigma=0.25, iterations=1),
+        Svgf(separate=False, normal_history=4),
     ],
-    ids=["default", "paper", "running mean", "short", "unguided", "reference", "prefilter", "clamped", "clamped hard"],
+    ids=[
+        "default",
+        "paper",
+        "running mean",
+        "short",
+        "unguided",
+        "reference",
+        "prefilter",
+        "clamped",
+        "clamped hard",
+        "growing",
+    ],
 )
 def test_every_frame_agrees_with_double_precision(bench: Bench, p: Svgf) -> None:
     """With the same roundings to half precision only those values differ that fall on the other side of a rounding."""

@@ -4,16 +4,29 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 
 import pytest
 
 import assets
 from config import load
-from explain import WORDS, Subject, image_section, memory_section, pass_section, report, switch_section, tracer_section
+from explain import (
+    WORDS,
+    Subject,
+    image_section,
+    memory_section,
+    pass_section,
+    report,
+    scene_section,
+    switch_section,
+    tracer_section,
+)
 from gl.pipelines import DENOISERS
+from raytrace.camera import Camera, NamedCamera
 from raytrace.compiled import compile_scene
 from raytrace.features import compiled_in
 from raytrace.integrator import Settings, Tracer
+from raytrace.punctual import PunctualLight
 from raytrace.scene import Scene
 from tests.tracer.scenes import everything, glossy
 from tests.tracer.test_features import DARK
@@ -87,6 +100,17 @@ def test_the_tracer_does_what_the_scene_needs(subject: Subjects) -> None:
     shining = " ".join(" ".join(tracer_section(subject(glossy()))).split())
     assert re.search(r"guides with [^;]*a sky, [^;]*metals and gloss, [^;]*textures; without", shining)
     assert re.search(r"first_hit with [^;]*a sky, lamps, [^;]*textures; without", shining)
+
+
+def test_lights_and_cameras_that_move_are_told(subject: Subjects) -> None:
+    eye = Camera.look_at((0.0, 0.0, 3.0), (0.0, 0.0, 0.0))
+    still = PunctualLight("a", "point")
+    moved = replace(still, name="b", motion=lambda time: ((time, 0.0, 0.0), (0.0, 0.0, -1.0)))
+    cameras = (NamedCamera("front", eye), NamedCamera("round", eye, lambda time: eye))
+    lines = scene_section(subject(replace(DARK, lights=(still, moved), cameras=cameras, flight=lambda time: eye)))
+    assert row(lines, "lights").endswith("2 point without a surface; 1 of them moves")
+    assert row(lines, "camera").endswith("'front', 'round' (moves); a flight")
+    assert row(scene_section(subject(DARK)), "camera").endswith("no flight")
 
 
 def test_there_are_words_for_every_switch_of_a_kernel(subject: Subjects) -> None:

@@ -150,6 +150,11 @@ def test_recovery_counts_the_frames_until_the_error_is_steady():
     assert recovery([9.0, *[1.0] * 15]) == 1
 
 
+def test_what_is_not_over_when_the_frames_are_has_no_recovery():
+    assert recovery([1.0 - 0.05 * frame for frame in range(16)]) is None
+    assert recovery([1.0 - 0.05 * min(frame, 11) for frame in range(16)]) == 11
+
+
 def test_one_noisy_frame_later_on_is_no_relapse():
     assert recovery([5.0, 1.0, 1.0, 1.3, *[1.0] * 12]) == 1
 

@@ -164,6 +164,22 @@ def test_another_method_is_led_up_to_the_frame() -> None:
     played.close()
 
 
+def test_a_method_that_lacks_gradients_is_told_of_once(played: Playback) -> None:
+    now = state()
+    begin(played, now)
+    now.show("asvgf")
+    now.news = ""
+    begin(played, now)
+    assert now.news == "no gradients were recorded: light counts as unchanged"
+    now.news = ""
+    begin(played, now)
+    assert now.news == ""
+    now.show("svgf")
+    now.news = ""
+    begin(played, now)
+    assert now.news == ""
+
+
 def test_what_steers_the_camera_does_nothing_and_says_so(played: Playback) -> None:
     for key in ("W", "SHIFT", "R", "F6", "EQUAL", "MINUS", "F11"):
         assert played.refusal(BY_KEY[key].action).startswith(("recorded frames: ", "these frames are recorded"))

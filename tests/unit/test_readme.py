@@ -162,7 +162,7 @@ def accepted(command: str) -> None:
             check_arguments(rest)
         case [".venv/bin/python", "-m", "pytest", *rest]:
             assert all((ROOT / word).exists() for word in rest if word.startswith("tests"))
-        case [".venv/bin/python", "-m", module, *rest] if module.startswith("tools."):
+        case [".venv/bin/python", "-m", module, *rest] if module.startswith(("tools.", "bench.")):
             importlib.import_module(module).build_parser().parse_args(rest)
         case _:
             raise AssertionError(f"what is {command!r}?")

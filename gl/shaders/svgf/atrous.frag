@@ -2,7 +2,7 @@
 //
 // STEP: distance of the taps. SIGMA_N_SQUARINGS: log2 of the normal exponent, or -1 where it is no power of two.
 // LUMINANCE_STOP: 0 leaves out w_l. RAW: in_color is a sample that no pass has looked at yet.
-// GLOSSY: specular light, of surfaces of like roughness.
+// GLOSSY: specular light, of surfaces of like roughness. GROWING: the normals' exponent grows with the history.
 // The taps are written out, so that constants fold.
 
 #include "common/color.glsl"
@@ -18,6 +18,11 @@ uniform sampler2D in_reprojection; // w: history length before this frame
 uniform sampler2D in_specular_albedo; // a: roughness
 uniform float u_sigma_r;
 uniform float u_reach;
+#endif
+#ifdef GROWING
+uniform sampler2D in_length; // w: history length before this frame
+uniform float u_normal_history;
+float exponent;
 #endif
 uniform float u_accumulated_variance;
 uniform float u_sigma_z;
@@ -50,7 +55,9 @@ vec4 color_at(ivec2 q) {
 
 float normal_weight(vec3 n) {
     float w = max(dot(surface.xyz, n), 0.0);
-#if SIGMA_N_SQUARINGS >= 0
+#ifdef GROWING
+    w = pow(w, exponent);
+#elif SIGMA_N_SQUARINGS >= 0
     for (int i = 0; i < SIGMA_N_SQUARINGS; ++i) w *= w;
 #else
     w = pow(w, u_sigma_n);
@@ -103,6 +110,10 @@ void main() {
     gradient = texelFetch(in_gradient, p, 0).xy;
     floor_z = 0.1 * u_pixel_size * surface.w;
     l = luminance(centre.rgb);
+#ifdef GROWING
+    float length_now = texelFetch(in_length, p, 0).w + 1.0;
+    exponent = max(u_sigma_n * min(length_now / u_normal_history, 1.0), 1.0);
+#endif
 #ifdef GLOSSY
     roughness = texelFetch(in_specular_albedo, p, 0).a;
     inverse_r = LOG2_E / u_sigma_r;
