@@ -55,7 +55,7 @@ def test_every_key_that_switches_something_is_listed_once():
     listed = [binding for switch in switches(State(load(), "svgf"), status()) for binding in switch.bindings]
     others = {
         Action.SHOW, Action.PREVIOUS, Action.STEP, Action.RESET_CAMERA, Action.RESET_HISTORY, Action.NEXT_SCENE,
-        Action.SCREENSHOT, Action.BACK, Action.FLY, Action.PATH,
+        Action.SCREENSHOT, Action.BACK, Action.FLY,
     }  # fmt: skip
     expected = [binding for binding in BINDINGS if binding.action not in others]
     assert sorted(listed, key=BINDINGS.index) == expected

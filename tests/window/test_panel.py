@@ -60,7 +60,7 @@ def without(state: State, *names: str) -> dict[str, object]:
 
 
 def test_every_live_parameter_has_a_widget_and_no_other_has(hand):
-    hand.size = hand.pixels = (TALL[0], 3000)
+    hand.size = hand.pixels = (TALL[0], 6000)
     hand.draw(2)
     open_all(hand)
     for section, key, _ in LIVE:
@@ -73,7 +73,7 @@ def test_every_live_parameter_has_a_widget_and_no_other_has(hand):
 
 @pytest.mark.parametrize("section", sorted({section for section, _, _ in NUMBERS}))
 def test_sliders_go_from_one_end_of_the_range_to_the_other(hand, section):
-    hand.size = hand.pixels = (TALL[0], 3000)
+    hand.size = hand.pixels = (TALL[0], 6000)
     hand.draw(2)
     open_all(hand)
     before = without(hand.state, "config")
