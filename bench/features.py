@@ -72,8 +72,12 @@ def lookups(scene: str, size: tuple[int, int] = SIZE, rounds: int = ROUNDS) -> t
 
 def plain(scene: Scene) -> Scene:
     """``scene`` without textures, but for those that cut holes."""
-    none = dict.fromkeys(("base_texture", "emission_texture", "metallic_roughness_texture", "normal_texture"), -1)
-    materials = tuple(m if m.alpha_cutoff is not None else replace(m, **none) for m in scene.materials)
+    materials = tuple(
+        replace(m, base_texture=-1, emission_texture=-1, metallic_roughness_texture=-1, normal_texture=-1)
+        if m.alpha_cutoff is None
+        else m
+        for m in scene.materials
+    )
     return replace(scene, materials=materials)
 
 
