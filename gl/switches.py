@@ -11,11 +11,12 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-from config import PRESETS, SECTIONS, Config, apply_preset
+from config import SECTIONS, Config, apply_preset
 from errors import UserError
 from gl.pipelines import DENOISERS, FrameTraits, build
 from gl.plan import Node, Plan
 from parameter import Param, Value, parameters
+from presets import PRESETS
 
 FEW: Final = 16
 """Whole numbers with at most so many values are tried one by one, others at both ends of their range only."""

@@ -20,6 +20,7 @@ from typing import Any, Final
 import config
 from errors import UserError
 from parameter import parameters as parameters_of
+from presets import PRESETS
 from ui import keys
 
 README: Final = Path(__file__).resolve().parent.parent / "README.md"
@@ -46,13 +47,13 @@ def parameters() -> str:
 def presets() -> str:
     """The keys in which the presets of a section differ, with the value that each gives them."""
     rows = []
-    for section in config.PRESETS:
-        loaded = {name: getattr(_loaded(section, name), section) for name in config.PRESETS[section]}
+    for section in PRESETS:
+        loaded = {name: getattr(_loaded(section, name), section) for name in PRESETS[section]}
         for key in parameters_of(config.SECTIONS[section]):
             values = [json.dumps(getattr(group, key)) for group in loaded.values()]
             if key != "preset" and len(set(values)) > 1:
                 rows.append((f"`{section}.{key}`", *(f"`{value}`" for value in values)))
-    names = dict.fromkeys(name for section in config.PRESETS.values() for name in section)
+    names = dict.fromkeys(name for section in PRESETS.values() for name in section)
     return table(("parameter", *(f'`"{name}"`' for name in names)), rows)
 
 

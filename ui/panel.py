@@ -9,10 +9,11 @@ from typing import Final
 from imgui_bundle import imgui
 
 import assets
-from config import PRESETS, SECTIONS, preset_values
+from config import SECTIONS, preset_values
 from errors import UserError
 from gl.pipelines import DENOISERS
 from parameter import Param, Value, parameters
+from presets import PRESETS
 from ui import hud, theme, widgets
 from ui.keys import BINDINGS, Action
 from ui.state import PICTURE, State

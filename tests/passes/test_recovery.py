@@ -14,11 +14,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from config import PRESETS, Config, Display, load
+from config import Config, Display, load
 from gl.formats import lookup
 from gl.graph import Graph, Plan
 from gl.pipelines import DENOISERS, FrameTraits, build
 from gl.renderer import read
+from presets import PRESETS
 from raytrace.frame import FramePacket
 from tests.passes.harness import PIXEL_SIZE, Bench, frame
 

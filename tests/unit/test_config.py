@@ -8,9 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from config import PRESETS, SECTIONS, Config, Svgf, apply_preset, describe, load, preset_values
+from config import SECTIONS, Config, Svgf, apply_preset, describe, load, preset_values
 from errors import UserError
 from parameter import parameters
+from presets import PRESETS
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -12,7 +12,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 COMMANDS = {"app", "cli", "demo", "doctor", "explain", "headless", "session"}
-HELPERS = {"config", "console", "errors", "images", "parameter", "storage"}
+HELPERS = {"config", "console", "errors", "images", "parameter", "presets", "storage"}
 OURS = COMMANDS | HELPERS | {"assets", "bench", "gl", "raytrace", "tests", "tools", "ui"}
 OPENGL = {"moderngl", "glcontext", "OpenGL"}
 EMBREE = {"embreex", "trimesh"}
@@ -37,14 +37,19 @@ def layer(path: str, ours: str, banned: set[str], only: set[str] | None = None) 
 LAYERS = [
     layer("errors.py", "", set(), only=set()),
     layer("parameter.py", "errors", set(), only=set()),
-    layer("config.py", "errors parameter", set(), only=set()),
+    layer("presets.py", "parameter", set(), only=set()),
+    layer("config.py", "errors parameter presets", set(), only=set()),
     # What gl/ loads of raytrace/: neither may bring the tracer along.
     layer("raytrace/__init__.py", "", set(), only=set()),
     layer("raytrace/frame.py", "errors", set(), only={"numpy"}),
     layer("assets", "assets raytrace errors", OPENGL | EMBREE | WINDOWS),
     layer("raytrace", "raytrace config errors", OPENGL | WINDOWS),
-    layer("gl", "gl raytrace.frame config parameter errors", EMBREE | WINDOWS),
-    layer("ui", "ui assets bench.judge gl raytrace config parameter console errors images session storage", EMBREE),
+    layer("gl", "gl raytrace.frame config parameter presets errors", EMBREE | WINDOWS),
+    layer(
+        "ui",
+        "ui assets bench.judge gl raytrace config parameter presets console errors images session storage",
+        EMBREE,
+    ),
     layer(
         "bench",
         "assets bench gl raytrace config parameter console errors images session storage",
@@ -57,7 +62,7 @@ LAYERS = [
     ),
     layer("bench/judge.py", "bench.metrics bench.metrics_visual raytrace.still", OPENGL | WINDOWS | EMBREE),
     layer("explain.py", "config parameter gl raytrace session ui.state", OPENGL | EMBREE | WINDOWS),
-    layer("tools", "tools assets bench cli config parameter errors gl images raytrace session ui", WINDOWS),
+    layer("tools", "tools assets bench cli config parameter presets errors gl images raytrace session ui", WINDOWS),
 ]
 
 
