@@ -13,7 +13,6 @@ from bench.recording.sequence import open_sequence
 from bench.recording.writer import Recording, Stage
 from config import Asvgf, Bmfr, Config, Svgf, Taa
 from raytrace.frame import FramePacket
-from raytrace.integrator import Tracer
 from raytrace.scene import Scene
 from tests.passes.asvgf_oracle import Strata, changing_room, spread, void_and_factor, with_gradients
 from tests.passes.harness import F32, HALF, Bench, frame, noise
@@ -162,7 +161,7 @@ def in_the_dark() -> Scene:
     return replace(glossy_scene(), sky=(1e-5, 1e-5, 1e-5))
 
 
-def specular_means(bench: Bench, t: Tracer, packets: list[FramePacket], denoiser: str) -> list[float]:
+def specular_means(bench: Bench, packets: list[FramePacket], denoiser: str) -> list[float]:
     """Mean of the specular light that has been accumulated, frame by frame."""
     name = f"{denoiser}.specular.accumulate.out_color"
     bench.restart()
@@ -179,23 +178,27 @@ def test_specular_light_of_a_lamp_that_is_switched_off_is_gone_within_two_frames
             t.frame(i, what.camera, what.camera, (66, 44), cut=i == 0, remember="random", lamps=float(i < 8))
             for i in range(10)
         ]
-        adaptive = specular_means(bench, t, packets, "asvgf")
-        plain = specular_means(bench, t, packets, "svgf")
+        adaptive = specular_means(bench, packets, "asvgf")
+        plain = specular_means(bench, packets, "svgf")
     assert adaptive[9] < 0.01 * adaptive[7]
     assert plain[9] > 0.3 * plain[7]
 
 
 def test_factors_of_a_view_that_changes_do_not_add_up(bench: Bench) -> None:
-    """A camera in flight, light that rests: gradients have either sign, and the history stays where it was."""
-    with tracer(glossy_scene()) as t:
-        packets = flown(t, range(14), "random", moving=False, size=(66, 44))
-        noisy = [float(packet.specular[..., :3].mean()) for packet in packets if packet.specular is not None]
-        adaptive = specular_means(bench, t, packets, "asvgf")
+    """A camera in flight, light that rests, and the worst of noise: few strata see the lamp's highlights.
+
+    Gradients have either sign, and the history stays near where it was: 4 % off. Of factors above 1 alone it would be
+    8 %.
+    """
+    with tracer(in_the_dark()) as t:
+        packets = flown(t, range(30), "random", moving=False, size=(66, 44))
+        adaptive = specular_means(bench, packets, "asvgf")
     change = packets[-1].temporal_gradient_specular
     assert change is not None
     assert (change[..., 0] > 0).sum() > 10
     assert (change[..., 0] < 0).sum() > 10
-    assert np.mean(adaptive[6:]) == pytest.approx(np.mean(noisy[6:]), rel=0.05)
+    noisy = [float(packet.specular[..., :3].mean()) for packet in packets if packet.specular is not None]
+    assert np.mean(adaptive[6:]) == pytest.approx(np.mean(noisy[6:]), rel=0.06)
 
 
 def test_a_replay_of_a_glossy_recording_with_gradients_gives_the_live_picture(bench: Bench, tmp_path: Path) -> None:
