@@ -7,6 +7,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+import assets
+from bench import features
 from bench.scaling import Row, by_size, by_threads, by_triangles, medians, table, terrain
 
 
@@ -47,3 +49,18 @@ def test_rows_are_relative_to_what_they_say() -> None:
         "  16x8        1.00       2.00  1.000",
         "  32x16       3.00       4.00  0.500",
     ]
+
+
+def test_features_are_measured_where_they_are_lacking(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(features, "FEATURES", {"sky": "a constant sky", "lamps": "lamps"})
+    (cost,) = features.measure("cornell", (16, 16), rounds=1)
+    assert cost.feature == "sky"
+    assert cost.without > 0.0
+    assert cost.saved == cost.unused - cost.without
+
+
+def test_a_plain_scene_has_no_textures_but_those_that_cut_holes() -> None:
+    scene = assets.build("thin")
+    bare = features.plain(scene)
+    for before, after in zip(scene.materials, bare.materials, strict=True):
+        assert after == before if before.alpha_cutoff is not None else after.base_texture == -1

@@ -101,16 +101,20 @@ def albedo(app: App) -> Iterator[Callable[[], F32]]:
     """Looks at the tracer's albedo, free of noise: yields what makes another frame and returns how it looks."""
 
     def another() -> F32:
-        app.ask("h", "history reset")
+        # What is told of a frame may be read before the screen has it: that of the frame before it is there by then.
+        for _ in range(2):
+            app.ask("h", "history reset")
         return on_screen(app)
 
     views: list[str] = []
     while not views or views[-1] != "frame.albedo":
         views.append(look(app, "b"))
         assert views[-1] != "the picture", f"no albedo among {views}"
-    yield another
-    for view in [*views[-2::-1], "the picture"]:
-        app.ask("v", view)
+    try:
+        yield another
+    finally:
+        for view in [*views[-2::-1], "the picture"]:
+            app.ask("v", view)
 
 
 def jitter(app: App) -> None:
