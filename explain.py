@@ -20,7 +20,7 @@ from gl.switches import DENOISER, TRAIT, Effect, effects, nearest, reasons, ways
 from gl.upload import PREFIX
 from parameter import Value
 from raytrace.compiled import CompiledScene
-from raytrace.features import GRADIENT, compiled_in, content_of, images_of, rays_of
+from raytrace.features import compiled_in, content_of, gradients_of, images_of, rays_of
 from raytrace.frame import STRATUM
 from raytrace.integrator import Tracer
 from raytrace.scene import Scene
@@ -79,7 +79,10 @@ class Subject:
     @property
     def images(self) -> tuple[str, ...]:
         """Names of the images that frames for the denoiser will have."""
-        return (*self.tracer.images, *([GRADIENT] if remembered(self.config, self.denoiser) else []))
+        return (
+            *self.tracer.images,
+            *(gradients_of(self.tracer.variant) if remembered(self.config, self.denoiser) else ()),
+        )
 
     @cached_property
     def plan(self) -> Plan:
@@ -316,9 +319,11 @@ def _readers(plan: Plan, image: str) -> str:
 
 def _why_not_made(tracer: Tracer, image: str) -> str:
     """The feature of a scene or the wish that would have the tracer make ``image``."""
-    variant = tracer.variant
+    variant, positions = tracer.variant, tracer.settings.positions
+    if image in images_of(variant, positions, gradients=True):
+        return "no method asks for it"
     for field in variant._fields:
-        if image in images_of(variant._replace(**{field: True}), tracer.settings.positions):
+        if image in images_of(variant._replace(**{field: True}), positions, gradients=True):
             return f"the scene has no {WORDS.get(field, field)}"
     return "no method asks for it"
 

@@ -5,6 +5,8 @@ Time is in seconds, a frame is 1/30 s. None of them is in the list of scenes; th
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -42,9 +44,23 @@ def lamp_power(time: float) -> float:
 
 def switching() -> Scene:
     """The lamp flickers, then is switched off and on."""
-    scene = cornell.build()
-    materials = tuple(replace(m, dimmer=lamp_power) if m.emits else m for m in scene.materials)
-    return replace(scene, name="switching", materials=materials)
+    return replace(dimmed(cornell.build(), lamp_power), name="switching")
+
+
+def dimmed(scene: Scene, power: Callable[[float], float]) -> Scene:
+    """``scene`` with lamps that give the share ``power`` of their light at each time."""
+    materials = tuple(replace(m, dimmer=power) if m.emits else m for m in scene.materials)
+    return replace(scene, materials=materials)
+
+
+def off_in_frame_12(time: float) -> float:
+    """Share of a lamp's light."""
+    return float(round(time * FPS) < 12)
+
+
+def swaying(time: float) -> float:
+    """Share of a lamp's light: full, a fifth and full again in 24 frames."""
+    return 0.6 + 0.4 * math.cos(2.0 * math.pi * time * FPS / 24)
 
 
 def crossing() -> Scene:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from assets import dynamics
+from assets import dynamics, metals, mirrorish
 from bench.methods import Method, NewRenderer
 from bench.metrics import Mask, pooled, rmse, temporal_difference
 from bench.references import Reference, ReferenceCache
@@ -66,6 +66,26 @@ FILMS = {
         Film("still", dynamics.still, 56, (24, 25, 39, 40, 54, 55)),
     )
 }
+
+
+def _glossy(name: str, build: Callable[[], Scene]) -> tuple[Film, ...]:
+    def off() -> Scene:
+        return dynamics.dimmed(build(), dynamics.off_in_frame_12)
+
+    def sway() -> Scene:
+        return dynamics.dimmed(build(), dynamics.swaying)
+
+    return (
+        Film(f"{name}, still", build, 24, (22, 23)),
+        Film(f"{name}, off", off, 16, (11, 12, 13, 14, 15)),
+        Film(f"{name}, sway", sway, 24, (14, 15, 20, 21, 22, 23)),
+        Film(f"{name}, flight", build, 24, (14, 15, 22, 23), "flight"),
+        Film(f"{name}, flight, sway", sway, 24, (14, 15, 22, 23), "flight"),
+    )
+
+
+GLOSSY = (*_glossy("metals", metals.build), *_glossy("mirrorish", mirrorish.build))
+"""Films of specular light, in which lamps and the camera move."""
 
 
 @dataclass(frozen=True)

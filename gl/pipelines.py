@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from config import Config, Display, Svgf
 from gl.graph import Graph, Tex
 from gl.passes import display
-from gl.passes.asvgf import asvgf, change_of
+from gl.passes.asvgf import Samples, asvgf, change_of
 from gl.passes.bad_pixels import mark_bad
 from gl.passes.bmfr import View, bmfr, part_count, thread_count
 from gl.passes.exposure import auto_exposure
@@ -197,18 +197,27 @@ def _bmfr(g: Graph, config: Config, traits: FrameTraits) -> Tex:
     guides, features = Guides(g, traits.moving), named(albedo=s.albedo, roughness=s.specular_albedo)
     signals, albedos = {"direct": s.direct, "indirect": s.indirect}, s.albedos
     second: dict[str, Tex] = {}
+
+    def change(samples: Samples, method: str = "bmfr") -> Tex | None:
+        if not (p.adaptive and p.temporal):
+            return None
+        with g.scope(method):
+            gradients = replace(config.asvgf, gain=p.gain)
+            return change_of(g, samples, guides, gradients, traits.pixel_size, joint=len(samples.light) > 1)
+
+    samples = Samples((s.direct, s.indirect))
     if not p.demodulate:
         signals, albedos = {"direct": s.together(g, demodulate=False)}, {}
+        samples = samples if s.specular is None else Samples.whole(signals["direct"])
     elif s.specular is not None and p.separate:
-        second["in_specular"] = bmfr(g, {"direct": s.specular}, features, guides, p, view, "bmfr.specular")
+        apart, name = {"direct": s.specular}, "bmfr.specular"
+        second["in_specular"] = bmfr(
+            g, apart, features, guides, p, view, name, change(Samples.specular(s.specular), name)
+        )
     elif s.specular is not None:
         signals = {"direct": s.together(g)}
-    change = None
-    if p.adaptive and p.temporal:
-        with g.scope("bmfr"):
-            gradients = replace(config.asvgf, gain=p.gain)
-            change = change_of(g, s.direct, s.indirect, guides, gradients, traits.pixel_size, joint=True)
-    clean = bmfr(g, signals, features, guides, p, view, change=change)
+        samples = Samples.whole(signals["direct"])
+    clean = bmfr(g, signals, features, guides, p, view, change=change(samples))
     return display.modulate(g, in_direct=clean, in_emission=s.emission, **second, **albedos)
 
 

@@ -60,9 +60,8 @@ class Renderer:
         plan = self.plan(packet, config, denoiser, keep, split)
         reset = reset or self._discontinuity(packet)
         if (packet.scene_id, packet.index) == (self._scene_id, self._index):
-            packet = replace(
-                packet, temporal_gradient=None
-            )  # filtered again: histories have followed its light already
+            # Filtered again: histories have followed its light already.
+            packet = replace(packet, temporal_gradient=None, temporal_gradient_specular=None)
         with profiler.frame() if profiler else nullcontext():
             with profiler.measure("upload") if profiler else nullcontext():
                 self._uploader.upload(packet, (tex.name for tex in plan.imports))

@@ -25,7 +25,7 @@ class Uploader:
         """Write those images of ``packet`` that a plan imports, ``frame.direct`` being ``packet.direct``."""
         for name in names:
             values = getattr(packet, name.removeprefix(PREFIX), None)
-            if values is None and name == f"{PREFIX}temporal_gradient":
+            if values is None and name.startswith(f"{PREFIX}temporal_gradient"):
                 # A frame that was traced before anybody asked for gradients: nothing is known to have changed.
                 across, down = texture_size(packet.size, STRATUM)
                 values = np.zeros((down, across, 4), np.float32)

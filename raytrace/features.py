@@ -19,8 +19,8 @@ ILLUMINATION = ("direct", "indirect", "specular")
 """The images of a frame with noise; all others come from the guide kernel."""
 
 
-GRADIENT = "temporal_gradient"
-"""The image with what is known of the change since the last frame; made for a frame whose method asks for it."""
+GRADIENT, GRADIENT_SPECULAR = "temporal_gradient", "temporal_gradient_specular"
+"""The images with what is known of the change since the last frame; made for a frame whose method asks for it."""
 
 
 def images_of(variant: Variant, positions: bool, gradients: bool = False) -> tuple[str, ...]:
@@ -36,7 +36,12 @@ def images_of(variant: Variant, positions: bool, gradients: bool = False) -> tup
         "specular_albedo": variant.specular,
     }
     images = (name for name in (*ILLUMINATION, *Outputs._fields) if needed.get(name, True))
-    return (*images, *((GRADIENT,) if gradients else ()))
+    return (*images, *(gradients_of(variant) if gradients else ()))
+
+
+def gradients_of(variant: Variant) -> tuple[str, ...]:
+    """Names of the images that frames with temporal gradients have besides."""
+    return (GRADIENT, GRADIENT_SPECULAR) if variant.specular else (GRADIENT,)
 
 
 def rays_of(scene: CompiledScene) -> dict[str, int]:

@@ -45,12 +45,14 @@ class FramePacket:
     importance sampling; indirect is what arrives over one bounce. 0 where the camera ray misses. Both are what the
     diffuse part of the surface reflects.
     ``specular`` (H, W, 4): rgb = what its specular part reflects of both, divided by ``specular_albedo``; 0 where there
-    is none. None in a scene without metals and gloss, as is ``specular_albedo``.
+    is none; a as of the others. None in a scene without metals and gloss, as is ``specular_albedo``.
 
     ``temporal_gradient`` (ceil(H / 3), ceil(W / 3), 4): by how much the light has changed since the last frame, one
     surface point for each 3x3 pixels: luminance of the direct light now minus then, and the larger of the two; the same
     for indirect light. All 0 where there is none; exactly 0 in the differences where nothing changed. None unless asked
     for.
+    ``temporal_gradient_specular``: the same of specular light, and of all light over the sum of both albedos. What is
+    seen in a glossy surface also changes with the view. None in a scene without metals and gloss as well.
 
     Without noise (guides):
 
@@ -91,6 +93,7 @@ class FramePacket:
     position: F32 | None = None
     prev_position: F32 | None = None
     temporal_gradient: F32 | None = None
+    temporal_gradient_specular: F32 | None = None
     specular: F32 | None = None
     specular_albedo: F32 | None = None
     scene: str = ""

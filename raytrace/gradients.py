@@ -42,10 +42,10 @@ RULES: Final = ("random", "brightest")
 place of another one, it also makes the picture brighter (docs/asvgf.md)."""
 
 ORDINARY, CARRIED, REMEMBERED = np.float32(1.0), np.float32(0.0), np.float32(2.0)
-"""What ``a`` of ``direct`` and ``indirect`` tells of a sample: it is of this frame alone, it was carried over from the
-last one, it was chosen to be carried into the next."""
+"""What ``a`` of ``direct``, ``indirect`` and ``specular`` tells of a sample: it is of this frame alone, it was carried
+over from the last one, it was chosen to be carried into the next."""
 
-_ZERO, _HALF = np.float32(0.0), np.float32(0.5)
+_ZERO, _HALF, _ONE = np.float32(0.0), np.float32(0.5), np.float32(1.0)
 _PLANE_TOLERANCE = np.float32(0.5)  # widths of a pixel
 _NORMAL_TOLERANCE = np.float32(0.9)  # cosine
 _FAR = np.float32(np.inf)
@@ -56,8 +56,8 @@ class Points(NamedTuple):
     """One remembered pixel of each stratum, S of them, row by row.
 
     ``triangle`` (S,) int32, -1 = none; barycentrics ``u``, ``v`` (S,) float32; ``front`` (S,) int32: 1 if the face's
-    front was seen; ``pixel`` (S,) uint32: whose random numbers it had; ``light`` (S, 2) float32: luminance of its
-    direct and indirect sample.
+    front was seen; ``pixel`` (S,) uint32: whose random numbers it had; ``light`` (S, 2 or 3) float32: luminance of its
+    direct, indirect and, in a scene with specular surfaces, specular sample.
     """
 
     triangle: Any
@@ -68,10 +68,22 @@ class Points(NamedTuple):
     light: Any
 
     @staticmethod
-    def none(count: int) -> Points:
+    def none(count: int, signals: int = 2) -> Points:
         u, v = np.zeros((2, count), np.float32)
         triangle, front = np.full(count, -1, np.int32), np.zeros(count, np.int32)
-        return Points(triangle, u, v, front, np.zeros(count, np.uint32), np.zeros((count, 2), np.float32))
+        return Points(triangle, u, v, front, np.zeros(count, np.uint32), np.zeros((count, signals), np.float32))
+
+
+class Gloss(NamedTuple):
+    """Of a tile in a scene with specular surfaces, (N, 4) float32 each: the ``specular`` samples, and the pixels'
+    ``albedo`` and ``specular_albedo``."""
+
+    specular: Any
+    albedo: Any
+    specular_albedo: Any
+
+
+_NO_GLOSS = np.zeros((0, 4), np.float32)
 
 
 class Landings(NamedTuple):
@@ -118,8 +130,9 @@ class Memory:
 class Reshading:
     """One frame's share of the work: :meth:`replace` a tile's samples, shade them, :meth:`note` what came out.
 
-    Tiles hold whole strata. ``gradient`` (strata in y, in x, 4) float32 afterwards holds what
-    :attr:`raytrace.frame.FramePacket.temporal_gradient` does, ``points`` what is to be carried into the next frame.
+    Tiles hold whole strata. ``gradient`` and, in a scene with specular surfaces, ``specular`` (strata in y, in x, 4)
+    float32 afterwards hold what :attr:`raytrace.frame.FramePacket.temporal_gradient` and ``temporal_gradient_specular``
+    do, ``points`` what is to be carried into the next frame.
     """
 
     def __init__(
@@ -135,16 +148,19 @@ class Reshading:
         pixel_size: float,
         seed: int,
         brightest: bool,
+        glossy: bool = False,
     ) -> None:
         """``triangles``, ``info``: the scene's; ``eye``, ``matrix``, ``jitter``: the view's; ``pixel_size``: scene
-        units that a pixel is wide at depth 1; ``before``: points of the last frame, None without one."""
+        units that a pixel is wide at depth 1; ``before``: points of the last frame, None without one; ``glossy``: the
+        scene has specular surfaces."""
         across, down = strata(size)
         self._triangles, self._info, self._index, self._size, self._eye = triangles, info, index, size, eye
         self._pixel_size, self._seed, self._brightest = np.float32(pixel_size), seed, brightest
         self._before = before
         self._chosen = np.full(across * down, -1, np.int32)
-        self.points = Points.none(across * down)
+        self.points = Points.none(across * down, 3 if glossy else 2)
         self.gradient = np.zeros((down, across, 4), np.float32)
+        self.specular = np.zeros((down, across, 4), np.float32) if glossy else None
         count = across * down
         nowhere, following, pixel = np.full((3, count), -1, np.int32)
         self._landings = Landings(nowhere, following, pixel, np.zeros(count, np.float32))
@@ -162,14 +178,28 @@ class Reshading:
                 first, uint32(self._index - 1), triangle, u, v, pixels, frames, self._chosen,
             )  # fmt: skip
 
-    def note(self, first: int, triangle: I32, u: F32, v: F32, direct: F32, indirect: F32) -> None:
-        """Take the gradients from a tile's shaded samples, choose what to remember, and mark both."""
+    def note(
+        self, first: int, triangle: I32, u: F32, v: F32, direct: F32, indirect: F32, gloss: Gloss | None = None
+    ) -> None:
+        """Take the gradients from a tile's shaded samples, choose what to remember, and mark both.
+
+        ``gloss``: of a scene with specular surfaces.
+        """
         before = self._before if self._before is not None else self.points
+        specular = _NO_GLOSS if gloss is None else gloss.specular
         _note(
             self._triangles, before, self._landings, self._eye, self._size[0], first, self._seed, uint32(self._index),
-            self._brightest, triangle, u, v, direct, indirect, self._chosen,
+            self._brightest, triangle, u, v, direct, indirect, specular, self._chosen,
             self.gradient.reshape(-1, 4), self.points,
         )  # fmt: skip
+        if gloss is not None and self.specular is not None:
+            rows = len(triangle) // self._size[0]
+            across = self.specular.shape[1]
+            start = first // self._size[0] // STRATUM * across
+            _note_specular(
+                start, start + -(-rows // STRATUM) * across, before, self._landings, first, direct, indirect, gloss,
+                self._chosen, self.specular.reshape(-1, 4), self.points,
+            )  # fmt: skip
 
 
 def strata(size: tuple[int, int]) -> tuple[int, int]:
@@ -268,13 +298,47 @@ def _spread(carried, k, chosen, before, direct, indirect, gradient):  # type: ig
             gradient[k, 2 * signal + 1] = max(now, then)
 
 
+@kernel
+def _note_specular(  # type: ignore[no-untyped-def]
+    start, end, before, landings, first, direct, indirect, gloss, chosen, gradient, points
+):
+    """The same of specular light, and of all light in the surface's whole albedo, for the strata that :func:`_note` has
+    been through.
+
+    What the surface reflects then and now is weighted by its albedos now, so that whole light in which nothing changed
+    is the same to the bit, too, wherever the pixels' centres have moved to.
+    """
+    specular, albedo, specular_albedo = gloss
+    for k in range(start, end):
+        if chosen[k] >= 0:
+            i, s = landings.pixel[chosen[k]] - first, chosen[k]
+            specular[i, 3] = CARRIED
+            now, then = _luminance(specular, i), before.light[s, 2]
+            diffuse, glossy = _luminance(albedo, i), _luminance(specular_albedo, i)
+            part = glossy / (diffuse + glossy) if glossy > _ZERO else _ZERO
+            all_now = (_luminance(direct, i) + _luminance(indirect, i)) * (_ONE - part) + now * part
+            all_then = (before.light[s, 0] + before.light[s, 1]) * (_ONE - part) + then * part
+            if abs(now) < _FAR and abs(then) < _FAR:
+                gradient[k, 0] = now - then
+                gradient[k, 1] = max(now, then)
+            if abs(all_now) < _FAR and abs(all_then) < _FAR:
+                gradient[k, 2] = all_now - all_then
+                gradient[k, 3] = max(all_now, all_then)
+        if points.triangle[k] >= 0:
+            best = int(points.pixel[k]) - first
+            specular[best, 3] = REMEMBERED
+            points.light[k, 2] = _luminance(specular, best)
+
+
 @device
-def _brightest(corner, columns, lines, width, carried, triangle, direct, indirect):  # type: ignore[no-untyped-def]
+def _brightest(corner, columns, lines, width, carried, triangle, direct, indirect, specular):  # type: ignore[no-untyped-def]
     """The pixel with the brightest sample of its own; -1 where all are dark."""
     best, most = -1, _ZERO
     for y in range(lines):
         for i in range(corner + y * width, corner + y * width + columns):
             light = _luminance(direct, i) + _luminance(indirect, i)
+            if specular.shape[0] > 0:
+                light += _luminance(specular, i)
             if triangle[i] >= 0 and i != carried and light > most:
                 best, most = i, light
     return best
@@ -302,8 +366,8 @@ def _random(corner, columns, lines, width, carried, triangle, bits):  # type: ig
 
 @kernel
 def _note(  # type: ignore[no-untyped-def]
-    triangles, before, landings, eye, width, first, seed, frame, brightest, triangle, u, v, direct, indirect, chosen,
-    gradient, points,
+    triangles, before, landings, eye, width, first, seed, frame, brightest, triangle, u, v, direct, indirect, specular,
+    chosen, gradient, points,
 ):  # fmt: skip
     across = (width + STRATUM - 1) // STRATUM
     start = first // width
@@ -321,7 +385,7 @@ def _note(  # type: ignore[no-untyped-def]
             corner = row * STRATUM * width + column * STRATUM
             columns = min(STRATUM, width - column * STRATUM)
             if brightest:
-                best = _brightest(corner, columns, lines, width, carried, triangle, direct, indirect)
+                best = _brightest(corner, columns, lines, width, carried, triangle, direct, indirect, specular)
             else:
                 bits = wang(uint32(path_key(seed, k) ^ salt))
                 best = _random(corner, columns, lines, width, carried, triangle, bits)

@@ -27,7 +27,7 @@ from raytrace.cutouts import CutoutCaster, cutouts_of
 from raytrace.embree import open_caster
 from raytrace.features import ILLUMINATION, images_of
 from raytrace.frame import STRATUM, FramePacket
-from raytrace.gradients import Memory, Moment, Reshading
+from raytrace.gradients import Gloss, Memory, Moment, Reshading
 from raytrace.guides import Outputs, camera_rays, guide_kernel
 from raytrace.lights import SHADOW_END
 from raytrace.sampling import HALTON, HASH
@@ -364,7 +364,10 @@ class Tracer:
                 reshading.replace(first, hits.triangle, hits.u, hits.v, seeds.pixel, seeds.frame)
             self.shade(hits, seeds, view.eye, *signals[:, part], pixel=view.pixel)
             if reshading is not None:
-                reshading.note(first, hits.triangle, hits.u, hits.v, signals[0, part], signals[1, part])
+                gloss = None
+                if self.variant.specular:
+                    gloss = Gloss(signals[2, part], outputs.albedo[part], outputs.specular_albedo[part])
+                reshading.note(first, hits.triangle, hits.u, hits.v, signals[0, part], signals[1, part], gloss)
 
         embree = self.for_each_tile(tile, size, 4 if reshading is None else 4 * STRATUM)
         timings = {"trace": time.perf_counter() - start, "embree": embree}
@@ -372,7 +375,7 @@ class Tracer:
         if reshading is None:
             return packet
         self._memory.keep(moment, reshading.points)
-        return replace(packet, temporal_gradient=reshading.gradient)
+        return replace(packet, temporal_gradient=reshading.gradient, temporal_gradient_specular=reshading.specular)
 
     def _reshading(
         self, moment: Moment, previous: float, view: View, camera: Camera, cut: bool, rule: str
@@ -390,6 +393,7 @@ class Tracer:
             camera.pixel_size(moment.size[1]),
             self.settings.seed,
             rule == "brightest",
+            self.variant.specular,
         )
 
     def reference(

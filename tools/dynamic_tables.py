@@ -11,7 +11,7 @@ import time
 from collections.abc import Sequence
 
 from assets import dynamics
-from bench.dynamic import FILMS, Film, Footage, Outcome, compare, shoot
+from bench.dynamic import FILMS, GLOSSY, Film, Footage, Outcome, compare, shoot
 from bench.methods import NOISY, Method, NewRenderer
 from bench.references import ReferenceCache
 from cli import size_of
@@ -117,6 +117,7 @@ def build_parser() -> argparse.ArgumentParser:
     parser.add_argument("--size", default="320x180", metavar="WxH", help="size in pixels (default 320x180)")
     parser.add_argument("--samples", type=int, default=512, help="paths per pixel of references (default 512)")
     parser.add_argument("--frames", type=int, default=48, help="of each film, 78 at most (default 48)")
+    parser.add_argument("--glossy", action="store_true", help="films of specular light instead")
     parser.add_argument("--times", action="store_true", help="times only")
     return parser
 
@@ -128,7 +129,8 @@ def main() -> None:
     if args.times:
         times(lambda: Renderer(ctx), size)
     else:
-        films = [FILMS[name].first(args.frames) for name in args.films or FILMS]
+        chosen = GLOSSY if args.glossy else [FILMS[name] for name in args.films or FILMS]
+        films = [film.first(args.frames) for film in chosen]
         errors(lambda: Renderer(ctx), films, size, args.samples, ReferenceCache())
     ctx.release()
 

@@ -73,6 +73,13 @@ IMAGES: Final = {
         Image("specular_albedo", 3, "what specular was divided by; 0 on diffuse surfaces", field="specular_albedo"),
         Image("roughness", 1, "of metal and gloss, in [0, 1]; 1 on diffuse surfaces"),
         Image("gradient", 4, "A-SVGF: change of light, a pixel for 3x3", field="temporal_gradient", divisor=3),
+        Image(
+            "gradient_specular",
+            4,
+            "where there are gradient and specular: the same of specular and of all light",
+            field="temporal_gradient_specular",
+            divisor=3,
+        ),
         Image("carried", 1, "with gradient: 0 where the sample was carried over, 2 where it may be carried on, else 1"),
         Image("reference", 3, "converged radiance of all that is above", sparse=True),
     )

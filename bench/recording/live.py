@@ -39,7 +39,7 @@ class LiveRecorder:
         if self._error is not None:
             raise self._error
         # Whether frames have gradients changes with the method shown, and a sequence has them in all or none.
-        self._queue.put((replace(packet, temporal_gradient=None), camera))
+        self._queue.put((replace(packet, temporal_gradient=None, temporal_gradient_specular=None), camera))
         self.frames += 1
 
     def close(self) -> None:

@@ -100,8 +100,9 @@ def packet_of(
     if "roughness" in images:
         fields["specular_albedo"][..., 3] = images["roughness"][..., 0]
     if "carried" in images:
-        for signal in ("direct", "indirect"):
-            fields[signal][..., 3] = images["carried"][..., 0]
+        for signal in ("direct", "indirect", "specular"):
+            if signal in fields:
+                fields[signal][..., 3] = images["carried"][..., 0]
     fields.setdefault("emission", np.zeros((*hit.shape, 4), np.float32))
     albedo = np.where(hit[..., None], images["albedo"], np.float32(0.0))
     return FramePacket(

@@ -217,7 +217,7 @@ def _examine(folder: Path, found: Mapping[str, list[int]]) -> tuple[int, int]:
 def _other_size(path: Path, size: tuple[int, int], expected: tuple[int, int]) -> UserError:
     return UserError(
         f"{path}: {size[0]}x{size[1]} pixels, but beside color0.exr it must have {expected[0]}x{expected[1]}",
-        "all images of a sequence have one size, but gradient has a pixel for 3x3",
+        "all images of a sequence have one size, but gradient and gradient_specular have a pixel for 3x3",
     )
 
 

@@ -8,15 +8,19 @@ Deviations from the paper, in every preset; docs/asvgf.md has the measurements:
 * λ is brought from strata to pixels by likeness of surfaces, and changes are summed before they are divided: otherwise
   surfaces narrower than a stratum go on glowing when a lamp is off.
 * A sample that was carried over counts as much as λ says. Unchanged, it is in the history already.
-* Direct and indirect light have λ and history lengths of their own.
+* Direct, indirect and specular light have λ and history lengths of their own.
 * A signal that is less than a thousandth of all light can change by all of it without cutting its history.
 
 The preset ``best`` lets the history follow the light (``follow``): what was accumulated is multiplied by the factor
 that the light has changed by. λ as published says which part of the light is new, a few per cent in every frame of a
 moving lamp, and shortens a history of ten frames by as little. ``gain`` multiplies it; ten works, at a price in noise.
+
+In scenes with metals and gloss there is a second image of gradients, of specular and of all light (:class:`Samples`).
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 from config import Asvgf
 from gl.graph import FragmentPass, Graph, In, Out, Tex, Uniform
@@ -34,7 +38,7 @@ class Strata(FragmentPass):
 
     shader = "asvgf/strata.frag"
     in_direct = In("rgb: this frame's sample; a: 0 carried over from the last frame, 2 may be carried on, 1 neither")
-    in_indirect = In("this frame's sample, demodulated irradiance")
+    in_indirect = In("this frame's sample, demodulated irradiance", optional=True)
     in_surface = In(SURFACE)
     in_gradient = In("depth change per pixel, scene units")
     out_surface = Out("rgba32f", SURFACE, divisor=STRATUM)
@@ -76,13 +80,37 @@ class Lambda(FragmentPass):
     u_pixel_size = Uniform("float", "> 0, scene units a pixel is wide at depth 1")
 
 
-def change_of(g: Graph, direct: Tex, indirect: Tex, guides: Guides, p: Asvgf, pixel_size: float, joint: bool) -> Tex:
-    """Add the reconstruction of the gradients; returns λ of both signals, or of the one that they are together."""
-    change = g.import_("frame.temporal_gradient", "rgba32f", STRATUM)
+@dataclass(frozen=True)
+class Samples:
+    """Noisy light whose change is wanted, and where the tracer tells of it.
+
+    ``light``: direct and indirect light, or one signal. ``pair``: of the channels of ``image`` only these, 0 = xy or
+    1 = zw; None: all.
+    """
+
+    light: tuple[Tex, ...]
+    image: str = "temporal_gradient"
+    pair: int | None = None
+
+    @staticmethod
+    def specular(light: Tex) -> Samples:
+        """Of specular light alone."""
+        return Samples((light,), "temporal_gradient_specular", 0)
+
+    @staticmethod
+    def whole(light: Tex) -> Samples:
+        """Of all light where some of it is specular."""
+        return Samples((light,), "temporal_gradient_specular", 1)
+
+
+def change_of(g: Graph, samples: Samples, guides: Guides, p: Asvgf, pixel_size: float, joint: bool) -> Tex:
+    """Add the reconstruction of the gradients; returns λ of the signals, or with ``joint`` of direct and indirect light
+    together."""
+    change = g.import_(f"frame.{samples.image}", "rgba32f", STRATUM)
+    pair = {} if samples.pair is None else {"PAIR": samples.pair}
     strata = g.add(
         Strata(defines={"LIGHT": int(p.gradient_guided), "JOINT": int(joint)}),
-        in_direct=direct,
-        in_indirect=indirect,
+        **dict(zip(("in_direct", "in_indirect"), samples.light, strict=False)),
         in_surface=guides.surface,
         in_gradient=guides.gradient,
     )
@@ -98,6 +126,7 @@ def change_of(g: Graph, direct: Tex, indirect: Tex, guides: Guides, p: Asvgf, pi
                 "FIRST": int(i == 0),
                 "JOINT": int(joint),
                 "SIGMA_N_SQUARINGS": squarings(p.sigma_n),
+                **(pair if i == 0 else {}),
             },
         )
         change = g.add(
@@ -127,7 +156,7 @@ def change_of(g: Graph, direct: Tex, indirect: Tex, guides: Guides, p: Asvgf, pi
 def asvgf(
     g: Graph,
     signals: dict[str, Tex],
-    noisy: tuple[Tex, Tex],
+    noisy: tuple[Tex, ...],
     guides: Guides,
     p: Asvgf,
     pixel_size: float,
@@ -135,10 +164,18 @@ def asvgf(
 ) -> dict[str, Tex]:
     """Filter ``signals`` as :func:`gl.passes.svgf.svgf` does. ``noisy``: direct and indirect samples of the frame."""
     changes: dict[str, Change] = {}
-    if p.temporal:
+    power = p.power if p.cut == "power" else None
+    if p.temporal and "both" in signals:
         with g.scope("asvgf"):
-            joint = len(signals) == 1
-            found = change_of(g, *noisy, guides, p, pixel_size, joint)
-        known = [name for name in signals if name != "specular"]
-        changes = {name: Change(found, i, p.power if p.cut == "power" else None) for i, name in enumerate(known)}
+            gloss = specular_albedo is not None
+            samples = Samples.whole(signals["both"]) if gloss else Samples(noisy)
+            changes["both"] = Change(change_of(g, samples, guides, p, pixel_size, not gloss), 0, power)
+    elif p.temporal:
+        with g.scope("asvgf"):
+            found = change_of(g, Samples(noisy), guides, p, pixel_size, joint=False)
+            changes = {name: Change(found, i, power) for i, name in enumerate(("direct", "indirect"))}
+            if "specular" in signals:
+                with g.scope("specular"):
+                    found = change_of(g, Samples.specular(signals["specular"]), guides, p, pixel_size, joint=False)
+                changes["specular"] = Change(found, 0, power)
     return svgf(g, signals, guides, p, pixel_size, "asvgf", changes, specular_albedo)

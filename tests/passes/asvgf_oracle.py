@@ -57,14 +57,17 @@ class Strata:
     light: F64
 
     @staticmethod
-    def of(packet: FramePacket, joint: bool) -> Strata:
+    def of(packet: FramePacket, joint: bool, only: F64 | None = None) -> Strata:
+        """``only``: (H, W, 3) the one signal that is looked at; otherwise direct and indirect light."""
         width, height = packet.size
         rows, columns = -(-height // STRATUM), -(-width // STRATUM)
         surface, slope, light = np.zeros((rows, columns, 4)), np.zeros((rows, columns, 2)), np.zeros((rows, columns, 4))
         luminance = np.stack(
             [getattr(packet, n)[..., :3].astype(np.float64) @ REC_709 for n in ("direct", "indirect")], -1
         )
-        if joint:
+        if only is not None:
+            luminance = np.stack([only @ REC_709, np.zeros((height, width))], -1)
+        elif joint:
             luminance = np.stack([luminance.sum(-1), np.zeros((height, width))], -1)
         for row, column in np.ndindex(rows, columns):
             top, left = STRATUM * row, STRATUM * column

@@ -38,6 +38,7 @@ SCENES = {
         DARK, lights=(PunctualLight("spot", "spot"),), environment=Environment("grey", np.ones((4, 8, 3), np.float32))
     ),
 }
+GRADIENTS = {"temporal_gradient", "temporal_gradient_specular"}
 ALL_IMAGES = images_of(Variant(*(True for _ in Variant._fields)), positions=True, gradients=True)
 GLOSS = {"specular", "specular_albedo"}
 SURFACES = ("specular", "glossmap", "bumps", "colored")
@@ -60,7 +61,7 @@ def test_frames_have_the_images_that_are_told(what: str, positions: bool, missin
         packet = tracer.frame(0, scene.camera, scene.camera, SIZE)
         present = {f.name for f in fields(FramePacket) if isinstance(getattr(packet, f.name), np.ndarray)}
         assert set(tracer.images) == set(images_of(tracer.variant, positions)) == present
-        assert set(ALL_IMAGES) - present == missing | {"temporal_gradient"}, "nobody asked for gradients"
+        assert set(ALL_IMAGES) - present == missing | GRADIENTS, "nobody asked for gradients"
 
 
 def test_images_of_a_frame_are_all_told() -> None:

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from raytrace.camera import Camera
 from raytrace.frame import STRATUM, FramePacket
-from raytrace.gradients import CARRIED, REMEMBERED, RULES, Points, Reshading, strata
+from raytrace.gradients import CARRIED, REMEMBERED, RULES, Gloss, Points, Reshading, strata
 from raytrace.integrator import Tracer
 from raytrace.sampling import HALTON
 from tests.tracer.conftest import OpenTracer
-from tests.tracer.scenes import cornell, everything, mesh, quad, rigid, scene, view_of
+from tests.tracer.scenes import cornell, everything, glossy, mesh, quad, rigid, scene, view_of
 from tests.tracer.statistics import Estimate, assert_same
 from tests.tracer.test_determinism import assert_same_bits
 
@@ -63,6 +63,85 @@ def test_where_nothing_changed_the_gradient_is_zero_to_the_bit(trace: OpenTracer
             assert (values[..., 3] > 0).sum() > 5
 
 
+def still(t: Tracer, lamps: tuple[float, ...], rule: str = "random") -> list[FramePacket]:
+    """Frames of a camera and of objects that rest, each with its share of the lamps' light."""
+    camera = t.scene.scene.camera
+    return [t.frame(i, camera, camera, SIZE, cut=i == 0, remember=rule, lamps=share) for i, share in enumerate(lamps)]
+
+
+def gloss(packet: FramePacket) -> NDArray[np.float32]:
+    assert packet.temporal_gradient_specular is not None
+    return packet.temporal_gradient_specular
+
+
+def test_specular_light_that_did_not_change_has_no_gradient_to_the_bit(trace: OpenTracer) -> None:
+    """Nor has the sum of all light. There is no image of it where nothing is specular."""
+    for generator in (HALTON, 1):
+        for packet in still(trace(glossy(), threads=2, tile=512, generator=generator), (1.0,) * 3)[1:]:
+            for values in (change(packet), gloss(packet)):
+                np.testing.assert_array_equal(values[..., [0, 2]], 0.0)
+            assert (gloss(packet)[..., 1] > 0).mean() > 0.2
+            assert (gloss(packet)[..., 3] > gloss(packet)[..., 1]).any()
+    assert still(trace(cornell()), (1.0,))[0].temporal_gradient_specular is None
+
+
+def test_specular_gradients_are_the_differences_of_the_samples(trace: OpenTracer) -> None:
+    """A still camera whose lamp is dimmed: what is remembered lands in its own pixel. The sky goes on shining."""
+    for rule in RULES:
+        before, after = still(trace(glossy()), (1.0, 0.4), rule)
+        y, x = np.nonzero(marks(after) == CARRIED)
+        assert before.specular is not None
+        assert after.specular is not None
+        assert after.specular_albedo is not None
+        np.testing.assert_array_equal(after.specular[..., 3], marks(after))
+        np.testing.assert_array_equal(before.specular[y, x, 3], REMEMBERED)
+        now, then = (luminance(packet.specular)[y, x] for packet in (after, before) if packet.specular is not None)
+        values = gloss(after)[y // STRATUM, x // STRATUM]
+        np.testing.assert_allclose(values[:, 0], now - then, rtol=1e-4, atol=1e-6)
+        np.testing.assert_allclose(values[:, 1], np.maximum(now, then), rtol=1e-5, atol=1e-7)
+        assert (values[:, 0] < 0).sum() > 10
+        diffuse, lobe = luminance(after.albedo)[y, x], luminance(after.specular_albedo)[y, x]
+        part = lobe / np.maximum(diffuse + lobe, 1e-30)
+        assert ((part > 0) & (part < 1)).any()
+        whole = [
+            (1 - part) * (luminance(packet.direct) + luminance(packet.indirect))[y, x] + part * of
+            for packet, of in ((after, now), (before, then))
+        ]
+        np.testing.assert_allclose(values[:, 2], whole[0] - whole[1], rtol=1e-4, atol=1e-6)
+        np.testing.assert_allclose(values[:, 3], np.maximum(*whole), rtol=1e-5, atol=1e-7)
+
+
+def test_the_brightest_is_chosen_by_specular_light_as_well(trace: OpenTracer) -> None:
+    """A metal has no other: its points would never be remembered."""
+    packet = still(trace(glossy()), (1.0,), "brightest")[0]
+    assert packet.specular is not None
+    metal = (packet.albedo[..., :3].max(-1) == 0) & (packet.motion[..., 3] >= 0)
+    assert (marks(packet)[metal] == REMEMBERED).sum() > 10
+
+
+def test_specular_light_that_is_not_a_number_makes_no_gradient(trace: OpenTracer) -> None:
+    for bad in (np.nan, np.inf):
+        t = trace(glossy())
+        camera, size = t.scene.scene.camera, (12, 12)
+        everywhere = np.arange(144, dtype=np.int32)
+        hits = t.primary(view_of(t, camera, size), everywhere)
+        count = strata(size)[0] * strata(size)[1]
+        points = Points.none(count, 3)
+        seen = np.flatnonzero(hits.triangle >= 0)[::9][:5].astype(np.int32)
+        points.triangle[:5], points.u[:5], points.v[:5] = hits.triangle[seen], hits.u[seen], hits.v[seen]
+        points.front[:5], points.light[:5] = 1, 2.0
+        work = reshading(t, points, camera, size, glossy=True)
+        triangle, u, v = hits.triangle.copy(), hits.u.copy(), hits.v.copy()
+        work.replace(0, triangle, u, v, everywhere.astype(np.uint32), np.zeros(144, np.uint32))
+        direct, indirect, specular, albedo, lobe = np.full((5, 144, 4), 0.5, np.float32)
+        specular[:, 0] = bad
+        work.note(0, triangle, u, v, direct, indirect, Gloss(specular, albedo, lobe))
+        assert (specular[:, 3] == CARRIED).sum() > 0
+        assert work.specular is not None
+        assert not work.specular.any()
+        assert (work.gradient[..., 0] < 0).any()
+
+
 def test_where_something_moves_there_are_gradients_of_either_sign(trace: OpenTracer) -> None:
     what = cornell()
     slide = rigid((0.0, 1.0, 0.0), 0.0, (4.0, 0.0, 0.0))
@@ -77,7 +156,7 @@ def test_where_something_moves_there_are_gradients_of_either_sign(trace: OpenTra
 
 @any_rule
 def test_frames_are_the_same_for_every_tiling_and_any_number_of_threads(trace: OpenTracer, rule: str) -> None:
-    for what in (MOVING, everything()):
+    for what in (MOVING, everything(), glossy()):
         expected = flown(trace(what, tile=16384), range(3), rule)
         assert (marks(expected[-1]) == CARRIED).sum() > 30
         for tile, threads in ((1, 3), (800, 2)):
@@ -163,11 +242,13 @@ def test_a_point_goes_with_its_triangle(trace: OpenTracer) -> None:
     np.testing.assert_array_equal(change(packet)[..., [0, 2]], 0.0)
 
 
-def reshading(t: Tracer, points: Points, camera: Camera, size: tuple[int, int] = SIZE) -> Reshading:
+def reshading(
+    t: Tracer, points: Points, camera: Camera, size: tuple[int, int] = SIZE, glossy: bool = False
+) -> Reshading:
     view = view_of(t, camera, size)
     return Reshading(
         t.scene.triangles, t.scene.triangle_info, points, 7, size, view.eye, view.matrix, view.jitter,
-        camera.pixel_size(size[1]), 0, brightest=False,
+        camera.pixel_size(size[1]), 0, brightest=False, glossy=glossy,
     )  # fmt: skip
 
 

@@ -151,6 +151,10 @@ def test_images_are_made_and_uploaded_for_a_reason(subject: Subjects) -> None:
     shining = image_section(subject(glossy()))
     assert row(shining, "specular").endswith("uploaded; read by svgf.specular.accumulate")
     assert "rgba32f 64x36" in row(shining, "specular_albedo")
+    change = "temporal_gradient_specular"
+    assert row(shining, change).endswith("not made: no method asks for it")
+    assert row(image_section(subject(glossy(), "asvgf")), change).endswith("read by asvgf.specular.gradient0")
+    assert row(image_section(subject(DARK, "asvgf")), change).endswith("not made: the scene has no metals and gloss")
 
     moving = image_section(subject(everything()))
     assert row(moving, "prev_normal").endswith("uploaded; read by svgf.reproject")

@@ -42,7 +42,8 @@ def without(folder: Path, *names: str) -> Sequence:
 
 def test_what_was_written_is_read_to_the_bit(recording: tuple[Sequence, list[FramePacket]]) -> None:
     sequence, packets = recording
-    written = {name for name, image in IMAGES.items() if not image.sparse} - {n for group in TOGETHER for n in group}
+    only_some = {"gradient_specular"} | {name for group in TOGETHER for name in group}
+    written = {name for name, image in IMAGES.items() if not image.sparse} - only_some
     assert set(sequence.images) == written
     with opened() as shot:
         for packet in packets:

@@ -1,8 +1,8 @@
 // One iteration of the à-trous wavelet that spreads the sparse gradients. Schied et al. 2018, sec. 4.3.
 //
 // STEP: distance of the taps, in strata. FIRST: the input comes from the tracer. JOINT: direct and indirect are one
-// signal. SIGMA_N_SQUARINGS: log2 of the normal exponent, or -1 where it is no power of two. Changes are filtered with
-// their sign, so that what is left of their noise cancels.
+// signal. PAIR: only this pair of the input's channels counts, 0 or 1. SIGMA_N_SQUARINGS: log2 of the normal exponent,
+// or -1 where it is no power of two. Changes are filtered with their sign, so that what is left of their noise cancels.
 
 #include "common/finite.glsl"
 
@@ -25,6 +25,9 @@ vec4 change_at(ivec2 q) {
     vec4 c = texelFetch(in_change, q, 0);
 #if FIRST
     c = is_finite(c) ? c : vec4(0.0);
+#ifdef PAIR
+    c = vec4(PAIR == 0 ? c.xy : c.zw, 0.0, 0.0);
+#endif
 #if JOINT
     // What was and what is, each the sum of both signals.
     vec2 then = vec2(c.x > 0.0 ? c.y - c.x : c.y, c.z > 0.0 ? c.w - c.z : c.w);

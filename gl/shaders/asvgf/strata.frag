@@ -1,13 +1,16 @@
 // What each stratum of 3x3 pixels shows: the surface that its gradient belongs to, and the light on it.
 // Schied et al. 2018, sec. 4.3: the guides of the gradients' reconstruction.
 //
-// LIGHT: 1 writes mean and variance of the light as well. JOINT: 1 where direct and indirect are one signal.
+// LIGHT: 1 writes mean and variance of the light as well. JOINT: 1 where direct and indirect are one signal. Without
+// in_indirect there is one signal only.
 
 #include "common/color.glsl"
 #include "common/finite.glsl"
 
 uniform sampler2D in_direct; // a: 0 where a sample was carried over from the last frame
+#if HAS_IN_INDIRECT
 uniform sampler2D in_indirect;
+#endif
 uniform sampler2D in_surface;
 uniform sampler2D in_gradient;
 
@@ -29,7 +32,11 @@ void main() {
         vec4 direct = texelFetch(in_direct, p, 0);
         if (direct.a == 0.0) speaker = p;
 #if LIGHT
+#if HAS_IN_INDIRECT
         vec3 indirect = texelFetch(in_indirect, p, 0).rgb;
+#else
+        vec3 indirect = vec3(0.0);
+#endif
         if (!is_finite(direct.rgb) || !is_finite(indirect)) continue;
         vec2 l = vec2(luminance(clamp_radiance(direct.rgb)), luminance(clamp_radiance(indirect)));
 #if JOINT
