@@ -171,8 +171,7 @@ def test_the_error_appears_at_rest_goes_with_a_movement_and_is_mapped(display: s
     with application(display, tmp_path, "--no-animate", "--denoiser", "svgf") as app:
         picture = app.settled()
         assert not numbers(app), "nobody looks, so nothing is traced for it"
-        app.press("m")
-        app.await_title("error map on")
+        app.ask("m", "error map on$")
         wait_for(lambda: [row for row in numbers(app) if row[3] >= 32], "a reference of 32 paths")
         rmse, psnr, flip, _, noise = numbers(app)[-1]
         assert 0.0 < noise < 0.03
@@ -186,7 +185,6 @@ def test_the_error_appears_at_rest_goes_with_a_movement_and_is_mapped(display: s
         wait_for(lambda: "no reference: something moves" in app.stdout(), "the reference to be given up")
         told_before = len(numbers(app))
         wait_for(lambda: len(numbers(app)) > told_before, "the error of the other view")
-        app.press("m")
-        app.await_title("error map off")
+        app.ask("m", "error map off$")
         assert difference(app.settled(), mapped) > 0.05
         assert "Traceback" not in app.stderr()
