@@ -42,6 +42,13 @@ def test_without_either_the_samples_pass(bench: Bench) -> None:
     np.testing.assert_allclose(passed, expected, rtol=HALF)
 
 
+def test_without_time_what_is_not_finite_takes_no_part_in_the_fit(bench: Bench) -> None:
+    direct = with_alpha(np.full((SIZE[1], SIZE[0], 3), 0.75))
+    direct[10:14, 20:24] = np.nan
+    fitted = radiance(bench, replace(tilted(), direct=direct), temporal=False)
+    np.testing.assert_allclose(fitted, 0.75 * np.ones_like(fitted), rtol=0.02)
+
+
 def test_without_demodulation_a_texture_is_fitted_like_light(bench: Bench) -> None:
     """A checkered albedo under even light: kept to the bit of a half with demodulation, blurred without."""
     y, x = np.mgrid[: SIZE[1], : SIZE[0]]
