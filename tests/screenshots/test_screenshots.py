@@ -5,9 +5,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
-import moderngl
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -53,16 +50,6 @@ def films() -> dict[str, list[FramePacket]]:
 @pytest.fixture(scope="module")
 def packets(films: dict[str, list[FramePacket]]) -> list[FramePacket]:
     return films[""]
-
-
-@pytest.fixture
-def renderer(ctx: moderngl.Context) -> Iterator[Renderer]:
-    name = ctx.info["GL_RENDERER"]
-    if not name.startswith("llvmpipe"):
-        pytest.skip(f"the pictures are those of llvmpipe, this is {name}")
-    renderer = Renderer(ctx)
-    yield renderer
-    renderer.release()
 
 
 @pytest.mark.parametrize("method", METHODS)
