@@ -16,10 +16,9 @@ from numpy.typing import NDArray
 from errors import Notices, UserError
 from raytrace.environment import LARGEST_WIDTH
 from raytrace.hdr import load_environment
+from tests.unit.radiance_files import HEADER, run_lengths, written
 
 U8 = NDArray[np.uint8]
-
-HEADER = b"#?RADIANCE\n# a comment\nGAMMA=1\nPRIMARIES=0 0 0 0 0 0 0 0\nFORMAT=32-bit_rle_rgbe\n\n"
 
 
 def texels(width: int = 16, height: int = 8) -> U8:
@@ -35,31 +34,6 @@ def decoded(coded: U8) -> NDArray[np.float64]:
     """Ward 1991: (mantissa + 1/2) / 256 times 2 to the exponent less 128; row 0 at the bottom."""
     scale = 2.0 ** (coded[::-1, :, 3:].astype(np.float64) - 136)
     return np.where(coded[::-1, :, 3:] == 0, 0.0, (coded[::-1, :, :3] + 0.5) * scale)
-
-
-def run_lengths(coded: U8) -> bytes:
-    """Scanlines channel by channel, with runs where three or more are equal."""
-    out = bytearray()
-    for row in coded:
-        out += bytes((2, 2, len(row) >> 8, len(row) & 255))
-        for channel in row.T:
-            at = 0
-            while at < len(channel):
-                end = at + 1
-                while end < len(channel) and channel[end] == channel[at] and end - at < 127:
-                    end += 1
-                if end - at >= 3:
-                    out += bytes((128 + end - at, int(channel[at])))
-                else:
-                    end = min(at + 3, len(channel))
-                    out += bytes((end - at,)) + channel[at:end].tobytes()
-                at = end
-    return bytes(out)
-
-
-def written(path: Path, coded: U8, body: bytes, header: bytes = HEADER, size: bytes = b"-Y %d +X %d\n") -> Path:
-    path.write_bytes(header + size % coded.shape[:2] + body)
-    return path
 
 
 def test_run_lengths_and_plain_texels_are_the_same_picture(tmp_path: Path) -> None:
