@@ -10,12 +10,13 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assets.shapes import Shape, block, join, quad
-from assets.surfaces import lathe
+from assets.surfaces import ball, lathe
 from raytrace.camera import Camera
 from tests.scene_files.model import Model, grain, letter_f, matrix_of, write_sky
 from tests.unit.gltf_files import png
@@ -48,7 +49,8 @@ def stairs(folder: Path) -> LookAlike:
     """An interior as modelling programs export them, in world space: 13 objects that emit, among them panels behind
     openings, spots in the ceiling, and lights in the wall at mirrored nodes; a tiled floor half metal, wooden treads
     with gloss, brushed steel, glass with three extensions of its own; walls without normals, triangles without area;
-    and a camera of 70 degrees.
+    and a camera of 70 degrees. The ball that rolls is none of the real one's: it tries an animation, and lets this
+    scene share the tracer's compiled loops with another.
     """
     m = Model()
     wall = m.paint("wall", (0.89, 0.89, 0.89))
@@ -84,6 +86,8 @@ def stairs(folder: Path) -> LookAlike:
     m.show("window", rectangle((-1.0, 1.6, 2.98), (-1.6, 0, 0), (0, 1.2, 0)), m.lamp(warm))
     m.show("skylight", rectangle((0.0, 4.98, -2.0), (3.0, 0, 0), (0, 0, 0.6)), m.lamp((1.6, 1.6, 1.6)))
     m.show("cellar", rectangle((-1.6, 0.02, -2.3), (0.8, 0, 0), (0, 0, -0.5)), m.lamp((3.27, 3.27, 3.27)))
+    m.show("ball", ball(0.25, 24), m.paint("rubber", (0.1, 0.3, 0.7)), translation=[-1.0, 0.25, 0.6])
+    m.roll("ball", [(0.0, (-1.0, 0.25, 0.6)), (1.0, (1.0, 0.25, 0.6))])
     m.camera(Camera.look_at((3.5, 1.65, 2.4), (-1.0, 1.35, -1.2), yfov_degrees=70.0))
     used = ["emissive_strength", "transmission", "ior", "volume"]
     m.json["extensionsUsed"] = [f"KHR_materials_{name}" for name in used]
@@ -110,6 +114,9 @@ def classroom(folder: Path) -> LookAlike:
     """Rows of desks and chairs of bars 3 cm thick in a room of 3 m on a ground of 222 m, everything without normals;
     no light in the file, so that it comes from a sky with a sun, through windows with bars, one of which shows its
     tower; and a camera path of one matrix for each frame.
+
+    The real one has neither normal nor roughness maps nor a sign that glows, too little to light a scene: with them
+    this one shares the tracer's compiled loops with :func:`bottle`.
     """
     m = Model()
     shell = [
@@ -122,14 +129,27 @@ def classroom(folder: Path) -> LookAlike:
         block((-3.2, 3.0, -4.2), (3.2, 3.2, 4.2)),
     ]
     m.show("walls", join(shell), m.paint("walls", (0.65, 0.67, 0.8)), normals=False)
-    m.show("floor", rectangle((0, 0, 0), (3, 0, 0), (0, 0, -4)), m.paint("floor", (0.66, 0.59, 0.52)), normals=False)
+    planks = rectangle((0, 0, 0), (3, 0, 0), (0, 0, -4)).mapped((3, 4))
+    bumpy: dict[str, Any] = {"normalTexture": {"index": m.texture(png(_seams()[::-1]))}}
+    m.show("floor", planks, m.paint("floor", (0.66, 0.59, 0.52), **bumpy), normals=False)
     ground = rectangle((0, -0.05, 0), (111, 0, 0), (0, 0, -111))
     m.show("ground", ground, m.paint("ground", (0.45, 0.45, 0.5)), normals=False)
     chalk = np.full((48, 96, 3), (30, 58, 44), np.uint8)
     chalk[:, 24:72][letter_f(48, 48)] = 235
     board = rectangle((0, 1.6, -3.98), (1.8, 0, 0), (0, 0.7, 0))
     m.show("board", board, m.paint("board", image=chalk), normals=False)
-    wood = m.paint("wood", roughness=0.224, image=grain(32, 64, ((0.6, 0.4, 0.2), (0.75, 0.55, 0.32)), 2))
+    glow = np.zeros((24, 24, 3), np.uint8)
+    glow[letter_f(24, 24)] = (0, 110, 40)
+    emissive: dict[str, Any] = {
+        "emissiveFactor": [1.0, 1.0, 1.0],
+        "emissiveTexture": {"index": m.texture(png(glow[::-1]))},
+    }
+    sign = rectangle((2.4, 2.5, -3.98), (0.3, 0, 0), (0, 0.3, 0))
+    m.show("sign", sign, m.paint("sign", (0.0, 0.0, 0.0), **emissive), normals=False)
+    wood = m.paint("wood", roughness=0.8, image=grain(32, 64, ((0.6, 0.4, 0.2), (0.75, 0.55, 0.32)), 2))
+    worn = np.zeros((32, 64, 3), np.uint8)
+    worn[..., 1] = np.random.default_rng(3).integers(60, 120, (32, 64))
+    m.json["materials"][wood]["pbrMetallicRoughness"]["metallicRoughnessTexture"] = {"index": m.texture(png(worn))}
     steel = m.paint("steel", (0.7, 0.69, 0.69), roughness=0.316, metallic=1.0)
     seats = [(-1.8 + 1.2 * column, -2.2 + 1.4 * row) for column in range(4) for row in range(4)]
     for name, pieces in (("desk", _desk()), ("chair", _chair())):
@@ -149,6 +169,13 @@ def classroom(folder: Path) -> LookAlike:
     path.write_text(json.dumps({"source": "generated", "frames": frames}))
     sky = write_sky(folder / "sky.hdr", azimuth=-20.0)
     return LookAlike(m.write_glb(folder / "classroom.glb"), sky, path, turned=58.0)
+
+
+def _seams() -> U8:
+    """Normals of planks along v, with grooves between them."""
+    image = np.full((32, 32, 3), (128, 128, 255), np.uint8)
+    image[:, ::8], image[:, 1::8] = (200, 128, 230), (56, 128, 230)
+    return image
 
 
 def _desk() -> tuple[Shape, Shape]:

@@ -52,6 +52,13 @@ class Model(GltfBuilder):
         )
         self.node(mesh=self.mesh(part), name=name, **node)
 
+    def roll(self, name: str, keys: Sequence[tuple[float, Color]]) -> None:
+        """Animate the place of an object: (seconds, place) from key to key."""
+        node = next(k for k, node in enumerate(self.json["nodes"]) if node["name"] == name)
+        sampler = {"input": self.accessor([time for time, _ in keys]), "output": self.accessor([at for _, at in keys])}
+        channel = {"sampler": 0, "target": {"node": node, "path": "translation"}}
+        self.add("animations", {"samplers": [sampler], "channels": [channel]})
+
     def camera(self, camera: Camera) -> None:
         entry = {"yfov": camera.yfov, "znear": 0.01, "zfar": 1e4, "aspectRatio": 1.0}
         index = self.add("cameras", {"type": "perspective", "perspective": entry})

@@ -13,6 +13,8 @@ from gl.renderer import Renderer
 from tests.screenshots.compare import REFERENCES, check, difference, load
 from tests.screenshots.filming import film
 
+pytestmark = pytest.mark.usefixtures("shared_loops")
+
 DENOISERS = {
     "interior": "svgf",  # bright to the corners, textures upright; leaves, rug and books as sharp as pixels allow
     "metals": "svgf",  # polished on the left, rough on the right; copper, green and steel keep their colours

@@ -18,6 +18,8 @@ from tests.screenshots.filming import film
 
 CORNELL = Path(__file__).parents[1] / "scene_files" / "cornell_bitterli.glb"
 
+pytestmark = pytest.mark.usefixtures("shared_loops")
+
 DENOISERS = {
     "stairs": "svgf",  # lit by door and window, spots and lights beside the steps all white, tiles lead to the door
     "classroom": "bmfr",  # the F on the board, the red tower in the middle window, sun on the floor, legs of desks
