@@ -10,7 +10,7 @@ import pytest
 
 from assets import SCENES
 from gl.renderer import Renderer
-from tests.screenshots.compare import REFERENCES, check, difference, load
+from tests.screenshots.compare import REFERENCES, SHARE, check, difference, load
 from tests.screenshots.filming import film
 
 pytestmark = pytest.mark.usefixtures("shared_loops")
@@ -23,6 +23,9 @@ DENOISERS = {
     "mirrorish": "svgf",  # the floor shows block, ball and the right tube upside down; the metal ball has all in it
     "hard": "bmfr",  # direct light on the right wall only; one ball is white, the other all but black
 }
+CURVED = 0.01
+"""Share of the pixels that may differ where balls are mirrors: they magnify what rounding changes in a ray. Camera rays
+that were off by the last bit changed up to 0.26 % here and 0.11 % in any other picture."""
 
 
 def test_every_scene_has_its_picture() -> None:
@@ -31,11 +34,12 @@ def test_every_scene_has_its_picture() -> None:
 
 @pytest.mark.parametrize("scene", DENOISERS)
 def test_picture(renderer: Renderer, scene: str, regenerate: bool) -> None:
-    check(f"scene_{scene}", film(renderer, scene, DENOISERS[scene], camera="flight"), regenerate)
+    share = CURVED if scene == "metals" else SHARE
+    check(f"scene_{scene}", film(renderer, scene, DENOISERS[scene], camera="flight"), regenerate, share=share)
 
 
 def test_far_looks_as_the_interior_does(renderer: Renderer) -> None:
     """10^5 m away single precision would have 8 mm to spare: it must not be used before the origin is subtracted."""
     away = film(renderer, "far", DENOISERS["interior"], camera="flight")
     found = difference(away, load(REFERENCES / "scene_interior.png"))
-    assert found.passes
+    assert found.passes()

@@ -22,20 +22,22 @@ def test_rounding_passes(picture: U8) -> None:
     assert difference(picture, picture) == (0.0, 0.0)
     rounded = picture.copy()
     rounded[::4, ::3] += 1
-    assert difference(rounded, picture).passes
+    assert difference(rounded, picture).passes()
     few = picture.copy()
     few.reshape(-1, 3)[:28] += 50  # 28 of 14400 pixels: 0.19 %
-    assert difference(few, picture).passes
+    assert difference(few, picture).passes()
 
 
 def test_a_changed_picture_does_not(picture: U8) -> None:
     everywhere = picture + np.uint8(1)  # a brightness that nobody would see
-    assert not difference(everywhere, picture).passes
+    assert not difference(everywhere, picture).passes()
     spots = picture.copy()
     spots.reshape(-1, 3)[:30, 0] += 3  # 0.21 % in one channel
-    assert not difference(spots, picture).passes
+    assert not difference(spots, picture).passes()
+    assert difference(spots, picture).passes(share=0.003)
+    assert not difference(everywhere, picture).passes(share=1.0)
     moved = np.roll(picture, 1, axis=1)
-    assert not difference(moved, picture).passes
+    assert not difference(moved, picture).passes()
 
 
 def test_a_failure_leaves_three_pictures(picture: U8, tmp_path: Path) -> None:
