@@ -259,8 +259,8 @@ class Tracer:
         """One path from each of ``hits``, with the random numbers of ``seeds``, at the time last set.
 
         Writes ``direct`` and ``indirect`` (n, 3 or 4) float32: radiance towards ``eye`` (3,) float32 divided by the
-        albedo; 0 where there is no hit; 1 in a fourth channel. Depends on nothing but the surface point, the seeds, the time and the side of
-        the surface that ``eye`` is on.
+        albedo; 0 where there is no hit; 1 in a fourth channel. Depends on nothing but the surface point, the seeds, the
+        time and the side of the surface that ``eye`` is on.
 
         In a scene with specular surfaces also ``specular``, divided by theirs; there it depends on ``eye`` itself, and
         on ``pixel``, the width of a pixel at distance 1, by which textures are filtered.

@@ -28,7 +28,7 @@ from raytrace.sampling import (
     PAIR_SELECT,
     sample_cosine,
 )
-from raytrace.tables import Variant, base_color, interpolate, shading_normal, surface_color
+from raytrace.tables import Variant, base_color, interpolate, prefetch_hit, shading_normal, surface_color
 
 _ZERO, _ONE = np.float32(0.0), np.float32(1.0)
 _PI, _INV_PI = np.float32(math.pi), np.float32(1.0 / math.pi)
@@ -105,6 +105,7 @@ def second_hit_kernel(variant: Variant) -> Callable[..., Any]:
         shadows = 0
         lights = lamps or punctual or has_sky or environment
         for k in range(triangle.shape[0]):
+            prefetch_hit(textured, tables, triangle, k)
             i = bounce_index[k]
             t = triangle[k]
             if t < 0:

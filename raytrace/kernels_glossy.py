@@ -32,7 +32,7 @@ from raytrace.sampling import (
     tangent_frame,
 )
 from raytrace.surface import bumped, footprint_of, seen_from, surface_gloss, to_local, view_cosine, view_in_frame
-from raytrace.tables import Variant, interpolate, shading_normal, surface_color
+from raytrace.tables import Variant, interpolate, prefetch_hit, shading_normal, surface_color
 
 _ZERO, _ONE = np.float32(0.0), np.float32(1.0)
 _INV_PI = np.float32(1.0 / math.pi)
@@ -170,6 +170,7 @@ def second_hit_kernel(variant: Variant, separable: bool) -> Callable[..., Any]:
         shadows = 0
         lights = lamps or punctual or has_sky or environment
         for k in range(triangle.shape[0]):
+            prefetch_hit(textured, tables, triangle, k)
             i = bounce_index[k]
             t = triangle[k]
             weight = bounce_weight[k]
