@@ -10,7 +10,8 @@ run:        ## open the window (without a display: the headless demo); ARGS="--s
 	@$(VENV) app.py $(ARGS)
 
 test: lint  ## lint, types, every test
-	$(VENV) -m pytest -q
+	$(VENV) -m pytest -q -n auto --maxprocesses 4 --dist loadfile -m "not window"
+	$(VENV) -m pytest -q -m window  # one after the other: they wait for windows and watch the clock
 
 bench:      ## the measured table of the README
 	@$(PYTHON) tools/setup.py run

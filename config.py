@@ -36,7 +36,7 @@ class Render(Section):
         doc="sub-pixel camera jitter; auto: in the window, while TAA is on",
     )
     threads: int = param(0, 0, 256, "[0;256] threads that trace; 0: one for each core", live=False)
-    tile: int = param(16384, 256, 1048576, "[256;1048576] pixels traced by one thread in one go", live=False)
+    tile: int = param(10240, 256, 1048576, "[256;1048576] pixels traced by one thread in one go", live=False)
     regularize: bool = param(
         True, doc="widen narrow specular lobes at a path's second hit; never in references", live=False
     )

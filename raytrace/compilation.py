@@ -11,7 +11,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from numba import config, njit
+from llvmlite import ir
+from numba import config, njit, types
+from numba.core import cgutils
+from numba.extending import intrinsic
 
 Compiled = Callable[..., Any]
 
@@ -76,3 +79,31 @@ def inlined(function: Callable[..., Any]) -> Compiled:
     """A device function that takes a scene's tables: always inlined, since a call would copy a kilobyte of pointers."""
     compiled: Compiled = njit(inline="always", **_options)(function)
     return compiled
+
+
+def _prefetch(typing_context, array, row, column):  # type: ignore[no-untyped-def]
+
+    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        pointers: Any = cgutils
+        kind = signature.args[0]
+        store = context.make_array(kind)(context, builder, arguments[0])
+        indices = [
+            context.cast(builder, value, given, types.intp)
+            for value, given in zip(arguments[1 : 1 + kind.ndim], signature.args[1:], strict=False)
+        ]
+        address = pointers.get_item_pointer(context, builder, kind, store, indices, wraparound=False)
+        byte = ir.IntType(8).as_pointer()
+        number = ir.IntType(32)
+        function = builder.module.declare_intrinsic(
+            "llvm.prefetch", [byte], ir.FunctionType(ir.VoidType(), [byte, number, number, number])
+        )
+        read, keep, data = number(0), number(3), number(1)
+        builder.call(function, [builder.bitcast(address, byte), read, keep, data])
+        return context.get_dummy_value()
+
+    return types.void(array, row, column), generate
+
+
+prefetch: Compiled = intrinsic(_prefetch)
+"""Called with an array, a row and a column, by kernels: ask for the cache line there, which is needed soon and
+which the processor then fetches meanwhile. An array of one dimension has no columns."""

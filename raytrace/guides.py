@@ -17,7 +17,7 @@ from raytrace.compiled import FACE_NORMAL, MATERIAL, OBJECT, SMOOTH, SPECULAR
 from raytrace.lights import environment_at
 from raytrace.reflectance import albedos
 from raytrace.surface import bumped, footprint_of, seen_from, surface_gloss, view_cosine
-from raytrace.tables import Variant, base_color, interpolate, shading_normal, surface_color
+from raytrace.tables import Variant, base_color, interpolate, prefetch_hit, shading_normal, surface_color
 
 _ZERO, _ONE, _HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
 MIN_COSINE = np.float32(0.05)  # grazing limit of the depth gradient and of texture footprints
@@ -108,6 +108,7 @@ def guide_kernel(variant: Variant, positions: bool) -> Callable[..., Any]:
         pixel = math.sqrt(up[0] * up[0] + up[1] * up[1] + up[2] * up[2]) * np.float32(2.0) / np.float32(height)
         sx, sy = np.float32(2.0) / np.float32(width), np.float32(2.0) / np.float32(height)
         for i in range(pixels.shape[0]):
+            prefetch_hit(textured, tables, triangle, i)
             p = pixels[i]
             t = triangle[i]
             if t < 0:

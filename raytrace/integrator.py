@@ -30,7 +30,7 @@ from raytrace.frame import STRATUM, FramePacket
 from raytrace.gradients import Gloss, Memory, Moment, Reshading
 from raytrace.guides import Outputs, camera_rays, guide_kernel
 from raytrace.lights import SHADOW_END
-from raytrace.sampling import HALTON, HASH
+from raytrace.sampling import HALTON, HASH, PAIR_LOBE, PAIR_SELECT, draw
 from raytrace.tables import Variant, tables_of, variant_of
 
 F32 = NDArray[np.float32]
@@ -117,6 +117,8 @@ class _Scratch(threading.local):
         self.light = np.empty((count, 3), np.float32)
         self.index, self.bounce_index = np.empty((2, count), np.int32)
         self.bounce_pdf, self.limit = np.empty((2, count), np.float32)
+        self.keys = np.empty(count, np.uint32)
+        self.numbers = np.empty((PAIR_SELECT + 1, 2, count), np.float32)
         self.glossy_capacity = 0
 
     def reserve_glossy(self, count: int) -> None:
@@ -125,6 +127,7 @@ class _Scratch(threading.local):
             return
         self.glossy_capacity = count
         self.gloss = np.empty((count, 3), np.float32)
+        self.glossy_numbers = np.empty((PAIR_LOBE + 1, 2, count), np.float32)
         self.bounce_cosine, self.bounce_weight = np.empty(count, np.float32), np.empty((count, 4), np.float32)
 
 
@@ -138,7 +141,7 @@ class Settings:
     seed: int = 0
     generator: int = HALTON
     threads: int = 0
-    tile: int = 16384
+    tile: int = 10240
     positions: bool = False
     backend: str = "auto"
     regularize: bool = True
@@ -255,9 +258,9 @@ class Tracer:
     ) -> None:
         """One path from each of ``hits``, with the random numbers of ``seeds``, at the time last set.
 
-        Writes ``direct`` and ``indirect`` (n, >= 3) float32: radiance towards ``eye`` (3,) float32 divided by the
-        albedo; 0 where there is no hit. Depends on nothing but the surface point, the seeds, the time and the side of
-        the surface that ``eye`` is on.
+        Writes ``direct`` and ``indirect`` (n, 3 or 4) float32: radiance towards ``eye`` (3,) float32 divided by the
+        albedo; 0 where there is no hit; 1 in a fourth channel. Depends on nothing but the surface point, the seeds, the
+        time and the side of the surface that ``eye`` is on.
 
         In a scene with specular surfaces also ``specular``, divided by theirs; there it depends on ``eye`` itself, and
         on ``pixel``, the width of a pixel at distance 1, by which textures are filtered.
@@ -271,10 +274,10 @@ class Tracer:
         settings = self.settings
         kernels.clear(direct)
         kernels.clear(indirect)
+        draw(seeds.pixel, seeds.frame, settings.seed, settings.generator, s.keys, s.numbers)
         shadows, bounces = self._first_hit(
-            self.tables, hits.triangle, hits.u, hits.v, eye, seeds.pixel, seeds.frame, settings.seed,
-            settings.generator, s.shadow_o, s.shadow_d, s.index, s.light, s.bounce_o, s.bounce_d, s.bounce_index,
-            s.bounce_pdf,
+            self.tables, hits.triangle, hits.u, hits.v, eye, s.numbers, s.shadow_o, s.shadow_d, s.index, s.light,
+            s.bounce_o, s.bounce_d, s.bounce_index, s.bounce_pdf,
         )  # fmt: skip
         self._trace_shadows(shadows, direct)
         if bounces == 0:
@@ -282,8 +285,8 @@ class Tracer:
         bounce_o, bounce_d = s.bounce_o[:bounces], s.bounce_d[:bounces]
         triangle, u, v = self.rays.intersect(bounce_o, bounce_d)
         shadows = self._second_hit(
-            self.tables, triangle, u, v, bounce_o, bounce_d, s.bounce_index, s.bounce_pdf, seeds.pixel, seeds.frame,
-            settings.seed, settings.generator, direct, s.shadow_o, s.shadow_d, s.index, s.light,
+            self.tables, triangle, u, v, bounce_o, bounce_d, s.bounce_index, s.bounce_pdf, s.numbers, direct,
+            s.shadow_o, s.shadow_d, s.index, s.light,
         )  # fmt: skip
         self._trace_shadows(shadows, indirect)
 
@@ -298,9 +301,10 @@ class Tracer:
         gloss = _NO_GLOSS if specular is None else specular
         for image in (direct, indirect, gloss):
             kernels.clear(image)
+        draw(seeds.pixel, seeds.frame, settings.seed, settings.generator, s.keys, s.glossy_numbers)
         shadows, bounces = self._first_hit(
-            self.tables, hits.triangle, hits.u, hits.v, eye, np.float32(pixel), seeds.pixel, seeds.frame,
-            settings.seed, settings.generator, s.shadow_o, s.shadow_d, s.index, s.light, s.gloss, s.bounce_o,
+            self.tables, hits.triangle, hits.u, hits.v, eye, np.float32(pixel), s.glossy_numbers,
+            s.shadow_o, s.shadow_d, s.index, s.light, s.gloss, s.bounce_o,
             s.bounce_d, s.bounce_index, s.bounce_pdf, s.bounce_cosine, s.bounce_weight,
         )  # fmt: skip
         self._trace_shadows(shadows, direct, specular)
@@ -310,7 +314,7 @@ class Tracer:
         triangle, u, v = self.rays.intersect(bounce_o, bounce_d)
         shadows = self._second_hit(
             self.tables, triangle, u, v, bounce_o, bounce_d, s.bounce_index, s.bounce_pdf, s.bounce_cosine,
-            s.bounce_weight, seeds.pixel, seeds.frame, settings.seed, settings.generator, settings.regularize, direct,
+            s.bounce_weight, s.glossy_numbers, settings.regularize, direct,
             gloss, s.shadow_o, s.shadow_d, s.index, s.light, s.gloss,
         )  # fmt: skip
         self._trace_shadows(shadows, indirect, specular)
@@ -351,7 +355,6 @@ class Tracer:
         reshading = self._reshading(moment, previous, view, camera, cut, remember) if remember else None
         count = size[0] * size[1]
         signals = np.empty((3 if self.variant.specular else 2, count, 4), np.float32)
-        signals[..., 3] = 1.0
         outputs = self._outputs(count)
 
         def tile(pixels: I32) -> None:

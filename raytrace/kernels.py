@@ -17,7 +17,6 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numba import uint32
 
 from raytrace.compilation import kernel
 from raytrace.compiled import FACE_NORMAL, LIGHT, MATERIAL, OBJECT, OFFSET, SMOOTH
@@ -27,11 +26,9 @@ from raytrace.sampling import (
     PAIR_LIGHT,
     PAIR_SECOND_LIGHT,
     PAIR_SELECT,
-    path_key,
-    random_pair,
     sample_cosine,
 )
-from raytrace.tables import Variant, base_color, interpolate, shading_normal, surface_color
+from raytrace.tables import Variant, base_color, interpolate, prefetch_hit, shading_normal, surface_color
 
 _ZERO, _ONE = np.float32(0.0), np.float32(1.0)
 _PI, _INV_PI = np.float32(math.pi), np.float32(1.0 / math.pi)
@@ -46,7 +43,7 @@ def first_hit_kernel(variant: Variant) -> Callable[..., Any]:
 
     @kernel
     def first_hit(  # type: ignore[no-untyped-def]
-        tables, triangle, u, v, eye, pixel_seeds, frame_seeds, seed, generator,
+        tables, triangle, u, v, eye, numbers,
         shadow_o, shadow_d, shadow_index, shadow_light, bounce_o, bounce_d, bounce_index, bounce_pdf,
     ):  # fmt: skip
         shadows, bounces = 0, 0
@@ -63,11 +60,9 @@ def first_hit_kernel(variant: Variant) -> Callable[..., Any]:
                 gx, gy, gz, nx, ny, nz = -gx, -gy, -gz, -nx, -ny, -nz
             offset = record[OFFSET]
             ox, oy, oz = x + gx * offset, y + gy * offset, z + gz * offset
-            key = path_key(seed, pixel_seeds[i])
-            frame = uint32(frame_seeds[i])
             if lights:
-                choice, _unused = random_pair(key, frame, PAIR_SELECT, generator)
-                a, b = random_pair(key, frame, PAIR_LIGHT, generator)
+                choice = numbers[PAIR_SELECT, 0, i]
+                a, b = numbers[PAIR_LIGHT, 0, i], numbers[PAIR_LIGHT, 1, i]
                 wx, wy, wz, dx, dy, dz, r, g, bl, density = sample_light(
                     textured, lamps, punctual, has_sky, environment,
                     tables, x, y, z, nx, ny, nz, gx, gy, gz, offset, a, b, choice,
@@ -82,7 +77,7 @@ def first_hit_kernel(variant: Variant) -> Callable[..., Any]:
                     shadow_light[shadows, 0], shadow_light[shadows, 1], shadow_light[shadows, 2] = r, g, bl
                     shadow_index[shadows] = i
                     shadows += 1
-            a, b = random_pair(key, frame, PAIR_BOUNCE, generator)
+            a, b = numbers[PAIR_BOUNCE, 0, i], numbers[PAIR_BOUNCE, 1, i]
             dx, dy, dz, cosine = sample_cosine(nx, ny, nz, a, b)
             if dx * gx + dy * gy + dz * gz > _ZERO and cosine > _ZERO:
                 bounce_o[bounces, 0], bounce_o[bounces, 1], bounce_o[bounces, 2] = ox, oy, oz
@@ -104,12 +99,13 @@ def second_hit_kernel(variant: Variant) -> Callable[..., Any]:
 
     @kernel
     def second_hit(  # type: ignore[no-untyped-def]
-        tables, triangle, u, v, bounce_o, bounce_d, bounce_index, bounce_pdf, pixel_seeds, frame_seeds, seed, generator,
+        tables, triangle, u, v, bounce_o, bounce_d, bounce_index, bounce_pdf, numbers,
         direct, shadow_o, shadow_d, shadow_index, shadow_light,
     ):  # fmt: skip
         shadows = 0
         lights = lamps or punctual or has_sky or environment
         for k in range(triangle.shape[0]):
+            prefetch_hit(textured, tables, triangle, k)
             i = bounce_index[k]
             t = triangle[k]
             if t < 0:
@@ -143,10 +139,8 @@ def second_hit_kernel(variant: Variant) -> Callable[..., Any]:
                 direct[i, 2] += b * weight
             if not lights:
                 continue
-            key = path_key(seed, pixel_seeds[i])
-            frame = uint32(frame_seeds[i])
-            _unused, choice = random_pair(key, frame, PAIR_SELECT, generator)
-            a, b = random_pair(key, frame, PAIR_SECOND_LIGHT, generator)
+            choice = numbers[PAIR_SELECT, 1, i]
+            a, b = numbers[PAIR_SECOND_LIGHT, 0, i], numbers[PAIR_SECOND_LIGHT, 1, i]
             offset = record[OFFSET]
             wx, wy, wz, dx, dy, dz, r, g, bl, density = sample_light(
                 textured, lamps, punctual, has_sky, environment,
@@ -185,11 +179,14 @@ def add_unoccluded(blocked, index, light, out):  # type: ignore[no-untyped-def]
 
 @kernel
 def clear(image):  # type: ignore[no-untyped-def]
-    """Zero in the first three channels; NumPy takes three times as long over rows of three out of four."""
+    """Zero in the first three channels and 1 in a fourth; NumPy takes three times as long over rows of four."""
+    alpha = image.shape[1] > 3
     for i in range(image.shape[0]):
         image[i, 0] = _ZERO
         image[i, 1] = _ZERO
         image[i, 2] = _ZERO
+        if alpha:
+            image[i, 3] = _ONE
 
 
 @kernel

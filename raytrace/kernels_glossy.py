@@ -14,7 +14,6 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numba import uint32
 
 from raytrace.brdf import alpha_of, evaluate, regularized, sample_lobe
 from raytrace.compilation import device, kernel
@@ -29,13 +28,11 @@ from raytrace.sampling import (
     PAIR_LOBE,
     PAIR_SECOND_LIGHT,
     PAIR_SELECT,
-    path_key,
-    random_pair,
     sample_cosine,
     tangent_frame,
 )
 from raytrace.surface import bumped, footprint_of, seen_from, surface_gloss, to_local, view_cosine, view_in_frame
-from raytrace.tables import Variant, interpolate, shading_normal, surface_color
+from raytrace.tables import Variant, interpolate, prefetch_hit, shading_normal, surface_color
 
 _ZERO, _ONE = np.float32(0.0), np.float32(1.0)
 _INV_PI = np.float32(1.0 / math.pi)
@@ -68,7 +65,7 @@ def first_hit_kernel(variant: Variant, separable: bool) -> Callable[..., Any]:
 
     @kernel
     def first_hit(  # type: ignore[no-untyped-def]
-        tables, triangle, u, v, eye, pixel, pixel_seeds, frame_seeds, seed, generator,
+        tables, triangle, u, v, eye, pixel, numbers,
         shadow_o, shadow_d, shadow_index, shadow_light, shadow_gloss,
         bounce_o, bounce_d, bounce_index, bounce_pdf, bounce_cosine, bounce_weight,
     ):  # fmt: skip
@@ -92,8 +89,6 @@ def first_hit_kernel(variant: Variant, separable: bool) -> Callable[..., Any]:
                 gx, gy, gz, nx, ny, nz = -gx, -gy, -gz, -nx, -ny, -nz
             offset = record[OFFSET]
             ox, oy, oz = x + gx * offset, y + gy * offset, z + gz * offset
-            key = path_key(seed, pixel_seeds[i])
-            frame = uint32(frame_seeds[i])
             glossy = specular and tables.material_info[material, SPECULAR] != 0
             tx, ty, tz, bx, by, bz = tangent_frame(nx, ny, nz)
             vx, vy, vz, alpha, share = _ZERO, _ZERO, _ONE, _ONE, _ZERO
@@ -112,8 +107,8 @@ def first_hit_kernel(variant: Variant, separable: bool) -> Callable[..., Any]:
                 pr, pg, pb = fr / sr, fg / sg, fb / sb
                 qr, qg, qb = (_ONE - fr) / sr, (_ONE - fg) / sg, (_ONE - fb) / sb
             if lights:
-                choice, _unused = random_pair(key, frame, PAIR_SELECT, generator)
-                a, b = random_pair(key, frame, PAIR_LIGHT, generator)
+                choice = numbers[PAIR_SELECT, 0, i]
+                a, b = numbers[PAIR_LIGHT, 0, i], numbers[PAIR_LIGHT, 1, i]
                 wx, wy, wz, dx, dy, dz, r, g, bl, density = sample_light(
                     textured, lamps, punctual, has_sky, environment,
                     tables, x, y, z, nx, ny, nz, gx, gy, gz, offset, a, b, choice,
@@ -133,8 +128,8 @@ def first_hit_kernel(variant: Variant, separable: bool) -> Callable[..., Any]:
                         put(shadow_gloss, shadows, r * lobe, g * lobe, bl * lobe)
                     shadow_index[shadows] = i
                     shadows += 1
-            a, b = random_pair(key, frame, PAIR_BOUNCE, generator)
-            follow, _unused = random_pair(key, frame, PAIR_LOBE, generator)
+            a, b = numbers[PAIR_BOUNCE, 0, i], numbers[PAIR_BOUNCE, 1, i]
+            follow = numbers[PAIR_LOBE, 0, i]
             if follow < share:
                 lx, ly, lz = sample_lobe(vx, vy, vz, alpha, a, b)
                 dx, dy, dz = lx * tx + ly * bx + lz * nx, lx * ty + ly * by + lz * ny, lx * tz + ly * bz + lz * nz
@@ -169,12 +164,13 @@ def second_hit_kernel(variant: Variant, separable: bool) -> Callable[..., Any]:
     @kernel
     def second_hit(  # type: ignore[no-untyped-def]
         tables, triangle, u, v, bounce_o, bounce_d, bounce_index, bounce_pdf, bounce_cosine, bounce_weight,
-        pixel_seeds, frame_seeds, seed, generator, regularize,
+        numbers, regularize,
         direct, gloss, shadow_o, shadow_d, shadow_index, shadow_light, shadow_gloss,
     ):  # fmt: skip
         shadows = 0
         lights = lamps or punctual or has_sky or environment
         for k in range(triangle.shape[0]):
+            prefetch_hit(textured, tables, triangle, k)
             i = bounce_index[k]
             t = triangle[k]
             weight = bounce_weight[k]
@@ -207,10 +203,8 @@ def second_hit_kernel(variant: Variant, separable: bool) -> Callable[..., Any]:
                 add_found(specular, direct, gloss, i, weight, r * scale, g * scale, bl * scale)
             if not lights:
                 continue
-            key = path_key(seed, pixel_seeds[i])
-            frame = uint32(frame_seeds[i])
-            _unused, choice = random_pair(key, frame, PAIR_SELECT, generator)
-            a, b = random_pair(key, frame, PAIR_SECOND_LIGHT, generator)
+            choice = numbers[PAIR_SELECT, 1, i]
+            a, b = numbers[PAIR_SECOND_LIGHT, 0, i], numbers[PAIR_SECOND_LIGHT, 1, i]
             offset = record[OFFSET]
             wx, wy, wz, sx, sy, sz, r, g, bl, density = sample_light(
                 textured, lamps, punctual, has_sky, environment,

@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from raytrace.compilation import device, inlined
-from raytrace.compiled import FACE_NORMAL, GLOSS_TEXTURE, NORMAL_TEXTURE, NORMALS, CompiledScene
+from raytrace.compilation import device, inlined, prefetch
+from raytrace.compiled import FACE_NORMAL, GLOSS_TEXTURE, NORMAL_TEXTURE, NORMALS, RECORD, CompiledScene
 from raytrace.directional_albedo import table
 from raytrace.textures import LINEAR, SRGB_TO_LINEAR, level_for, lookup
 
@@ -130,6 +130,26 @@ def variant_of(scene: CompiledScene) -> Variant:
         punctual=len(scene.scene.lights) > 0,
         environment=scene.scene.environment is not None,
     )
+
+
+AHEAD = 8
+"""Hits between asking for what is known of one and shading it."""
+
+
+@inlined
+def prefetch_hit(textured, tables, triangles, i):  # type: ignore[no-untyped-def]
+    """Ask for what shading the hit :data:`AHEAD` places behind number ``i`` of ``triangles`` will read.
+
+    Rays that bounced hit triangles that are in no cache: shading waited for memory a third of its time.
+    """
+    t = triangles[min(i + AHEAD, triangles.shape[0] - 1)]
+    if t >= 0:
+        prefetch(tables.triangles, t, 0)
+        prefetch(tables.triangles, t, RECORD - 1)
+        prefetch(tables.info, t, 0)
+        if textured:
+            prefetch(tables.uvs, t, 0)
+            prefetch(tables.uv_density, t, 0)
 
 
 @device

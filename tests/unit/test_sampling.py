@@ -80,6 +80,17 @@ def random_numbers(pair: int, generator: int, pixels: int, frames: int, seed: in
     return result
 
 
+@pytest.mark.parametrize("generator", [sampling.HALTON, sampling.HASH])
+def test_all_numbers_of_a_path_drawn_at_once_are_those_drawn_one_by_one(generator: int) -> None:
+    pixels, frames = np.meshgrid(np.arange(37, dtype=np.uint32), np.arange(19, dtype=np.uint32), indexing="ij")
+    numbers = np.full((5, 2, pixels.size + 3), np.nan, np.float32)  # buffers are as long as the largest tile
+    sampling.draw(pixels.ravel(), frames.ravel(), 7, generator, np.empty(pixels.size + 3, np.uint32), numbers)
+    assert np.isnan(numbers[..., -3:]).all()
+    for pair in range(5):
+        expected = random_numbers(pair, generator, 37, 19, seed=7)
+        np.testing.assert_array_equal(numbers[pair, :, :-3].T.reshape(37, 19, 2), expected)
+
+
 # ---------------------------------------------------------------------------------------------------------- generators
 
 
