@@ -72,10 +72,10 @@ class Svgf(Section):
     depth_tolerance: float = param(0.01, 0, 1, "[0;1] largest depth difference accepted in history, part of the depth")
     normal_tolerance: float = param(0.9, -1, 1, "[-1;1] smallest cosine between normals accepted in history")
     temporal: bool = param(True, doc="accumulate over time", structural=True, heading="accumulation")
-    alpha: float = param(0.2, 0, 1, "[0;1] smallest share of the new frame in the accumulated colour; 0: running mean")
+    alpha: float = param(0.07, 0, 1, "[0;1] smallest share of the new frame in the accumulated colour; 0: running mean")
     alpha_moments: float = param(0.2, 0, 0.5, "[0;0.5] smallest share of the new frame in the luminance moments")
     feedback_level: int = param(
-        0, -1, 7, "[-1;7] iteration that feeds the history, at most the last; -1: the unfiltered one", structural=True
+        -1, -1, 7, "[-1;7] iteration that feeds the history, at most the last; -1: the unfiltered one", structural=True
     )
     color_clamp: bool = param(
         False, doc="bound the accumulated colour by this frame's colours around the pixel", structural=True
@@ -101,21 +101,21 @@ class Svgf(Section):
         True, doc="scale the variance to that of the accumulated colour after the first iteration", structural=True
     )
     prefilter: bool = param(
-        False, doc="begin with the mean of 7x7 pixels where the history is shorter than four frames", structural=True
+        True, doc="begin with the mean of 7x7 pixels where the history is shorter than four frames", structural=True
     )
     iterations: int = param(
-        5, 0, 8, "[0;8] à-trous iterations; number i takes every 2^i-th pixel", structural=True, heading="wavelet"
+        3, 0, 8, "[0;8] à-trous iterations; number i takes every 2^i-th pixel", structural=True, heading="wavelet"
     )
     sigma_z: float = param(1.0, 0.01, 100, "[0.01;100] tolerance for depth, in depth slopes of the surface")
-    sigma_n: int = param(128, 1, 1024, "[1;1024] exponent of the cosine between normals; more: sharper")
+    sigma_n: int = param(64, 1, 1024, "[1;1024] exponent of the cosine between normals; more: sharper")
     normal_history: int = param(
-        0,
+        32,
         0,
         255,
         "[0;255] frames in which that exponent grows from 1, with the history; 0: it does not",
         structural=True,
     )
-    sigma_l: float = param(4.0, 0.01, 1000, "[0.01;1000] tolerance for luminance, in standard deviations of the noise")
+    sigma_l: float = param(6.0, 0.01, 1000, "[0.01;1000] tolerance for luminance, in standard deviations of the noise")
     first_sigma_l: float = param(4.0, 0.1, 1000, "[0.1;1000] sigma_l of the first iteration, in sigma_l of the others")
     sigma_r: float = param(0.1, 0.001, 100, "[0.001;100] tolerance for roughness, of specular light only")
     reach: float = param(
@@ -204,9 +204,9 @@ class Bmfr(Section):
         doc="what a block is fitted by: constant, normal, position with its square and cube; first the constant",
         structural=True,
     )
-    block: int = param(32, 8, 64, "[8;64] side of a block, in pixels", structural=True)
+    block: int = param(24, 8, 64, "[8;64] side of a block, in pixels", structural=True)
     part: int = param(
-        16,
+        12,
         0,
         32,
         "[0;32] side of the parts that are fitted again: what of half or a quarter of the block is nearer; 0: none",

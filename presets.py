@@ -14,9 +14,11 @@ PRESETS: dict[str, dict[str, dict[str, Value]]] = {
             "feedback_level": 0,
             "sigma_z": 1.0,
             "sigma_n": 128,
+            "normal_history": 0,
             "sigma_l": 4.0,
             "first_sigma_l": 1.0,
             "accumulated_variance": False,
+            "prefilter": False,
             "separate": True,
             "temporal": True,
             "variance_guided": True,
@@ -31,6 +33,7 @@ PRESETS: dict[str, dict[str, dict[str, Value]]] = {
             "feedback_level": 1,
             "sigma_z": 1.0,
             "sigma_n": 128,
+            "normal_history": 0,
             "sigma_l": 10.0,
             "first_sigma_l": 1.0,
             "accumulated_variance": False,
@@ -40,8 +43,18 @@ PRESETS: dict[str, dict[str, dict[str, Value]]] = {
             "demodulate": True,
             "prefilter": True,
         },
-        # What measured best in error at equal time on the Cornell flight (gl/passes/svgf.py, deviations).
-        "best": {"first_sigma_l": 4.0, "accumulated_variance": True},
+        # What measured best in error and time on flights through both scenes (docs/filters.md).
+        "best": {
+            "alpha": 0.07,
+            "iterations": 3,
+            "feedback_level": -1,
+            "sigma_n": 64,
+            "normal_history": 32,
+            "sigma_l": 6.0,
+            "first_sigma_l": 4.0,
+            "accumulated_variance": True,
+            "prefilter": True,
+        },
     },
     "bmfr": {
         # Koskela et al. 2019: preprocessing, feature fitting, postprocessing.
@@ -77,7 +90,7 @@ PRESETS: dict[str, dict[str, dict[str, Value]]] = {
             "demodulate": True,
         },
         # What measured best in error at equal time on flights through both scenes (docs/bmfr.md).
-        "best": {"part": 16, "regularization": "both"},
+        "best": {"block": 24, "part": 12, "regularization": "both"},
     },
 }
 PRESETS["asvgf"] = {

@@ -58,6 +58,7 @@ class GlossyVariance(Variance):
 
     in_specular_albedo = In(GLOSS)
     u_sigma_r = Uniform("float", "> 0, roughness edge-stopping")
+    u_reach = Uniform("float", "> 0, pixels per squared roughness, over which a colour is averaged")
 
 
 class GlossyVarianceInSpace(VarianceInSpace, GlossyVariance):
@@ -170,7 +171,7 @@ class _InSpace:
         self._defines = {"PREFILTER": 1} if p.prefilter else {}
         if gloss is not None:
             self._shape["in_specular_albedo"] = gloss
-            self._uniforms["u_sigma_r"] = p.sigma_r
+            self._uniforms |= {"u_sigma_r": p.sigma_r, "u_reach": p.reach}
             self._defines |= GLOSSY
 
     def add(self, color: Tex, sample: Tex | None = None, moments: Tex | None = None, length: Tex | None = None) -> Tex:

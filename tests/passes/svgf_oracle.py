@@ -191,7 +191,7 @@ class Oracle:
         sky = packet.motion[..., 3] < 0
         deviation = self.store(np.sqrt(np.where((length < 4) & ~sky, in_space, in_time)))
         history = color
-        if self.p.prefilter:
+        if self.p.prefilter and self.p.variance_guided:
             smooth = self.store(self.spatial_mean(color, packet))
             color = np.where(((length < 4) & ~sky)[..., None], smooth, color)
         for i in range(self.p.iterations):

@@ -129,7 +129,7 @@ def test_light_that_is_dimmed_is_followed_by_all_of_the_history(bench: Bench) ->
     """By a fifth, with gain 0 so that nothing is cut: mean over time and moments are those of dimmed samples."""
     size = (30, 20)
     names = [f"asvgf.direct.accumulate.out_{what}" for what in ("color", "moments")]
-    p = config(gain=0.0, feedback_level=-1, alpha_moments=0.2)
+    p = config(gain=0.0, feedback_level=-1, alpha=0.2, alpha_moments=0.2)
     for seed in range(8):
         images = bench.denoise(wall(size, noise(size, seed), (0, 1, 0, 1)), p, "asvgf", keep=names)
     color, moments = (images[name] for name in names)
@@ -147,7 +147,8 @@ def test_light_that_is_dimmed_is_followed_by_all_of_the_history(bench: Bench) ->
 def test_a_sample_that_is_in_the_history_does_not_count_twice(bench: Bench, separate: bool, fireflies: str) -> None:
     """Carried over from the last frame and unchanged: neither colour nor length. Changed, as much as λ says."""
     names = [f"asvgf.{'direct' if separate else 'both'}.accumulate.out_{what}" for what in ("color", "moments")]
-    p = replace(config(separate=separate, follow=False, gain=1.0), firefly=Firefly(mode=fireflies, max_radiance=100.0))
+    p = config(separate=separate, follow=False, gain=1.0, alpha=0.2)
+    p = replace(p, firefly=Firefly(mode=fireflies, max_radiance=100.0))
     for change, color, length in ((0.0, 1.0, 4.0), (-0.5, 1.0 + 0.6 * 0.5 * 2.0, 6 / 3.5 - 1.5), (-1.0, 3.0, 0.0)):
         bench.restart()
         for _ in range(5):

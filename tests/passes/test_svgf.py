@@ -98,8 +98,10 @@ def test_noise_goes_and_the_mean_stays(bench: Bench, size: Size, separate: bool)
     assert radiance.mean() == pytest.approx(2.0, rel=0.04)
 
 
-def test_surfaces_do_not_mix(bench: Bench) -> None:
-    """Two walls side by side that differ in depth only, in normal only, and a floor seen at an angle beside a wall."""
+@pytest.mark.parametrize(("frames", "changes"), [(3, {"normal_history": 0, "sigma_n": 128}), (20, {})])
+def test_surfaces_do_not_mix(bench: Bench, frames: int, changes: dict[str, int]) -> None:
+    """Two walls side by side that differ in depth only, and in normal only: never with a fixed weight of normals, and
+    once the history is long where that weight grows."""
     size = (50, 30)
     left = np.broadcast_to(np.arange(50) < 24, (30, 50))
     brightness = np.where(left, 1.0, 50.0)
@@ -107,10 +109,10 @@ def test_surfaces_do_not_mix(bench: Bench) -> None:
     flat = np.broadcast_to((0.0, 0.0, 1.0), tilted.shape)
     for depth, normal in ((np.where(left, 4.0, 5.0), flat), (np.full(left.shape, 4.0), tilted)):
         bench.restart()
-        for index in range(3):
+        for index in range(frames):
             grain = 1.0 + 0.5 * np.random.default_rng(index).standard_normal(left.shape).clip(-1.5, 1.5)
             packet = frame(size, direct=brightness * grain, object_id=~left, depth=depth, normal=normal)
-            images = bench.denoise(packet, without_taa())
+            images = bench.denoise(packet, without_taa(**changes))
         radiance = images["radiance"][..., 0]
         assert radiance[left & (brightness == 1.0)].max() < 2.0
         assert radiance[brightness == 50.0].min() > 25.0
@@ -363,7 +365,7 @@ def test_normals_count_the_more_the_longer_the_history(bench: Bench) -> None:
         p = Svgf(separate=False, variance_guided=False, feedback_level=-1, iterations=2, **changes)  # type: ignore[arg-type]
         return [contrast(bench.denoise(packet, Config(svgf=p))["radiance"]) for _ in range(frames)]
 
-    at_once, growing = sequence(), sequence(normal_history=8)
+    at_once, growing = (sequence(sigma_n=128, normal_history=history) for history in (0, 8))
     np.testing.assert_allclose(at_once, 1.0, atol=0.02)
     assert growing[0] < 0.7
     assert all(now >= before - 1e-3 for before, now in pairwise(growing))

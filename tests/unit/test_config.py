@@ -25,7 +25,7 @@ def write(folder: Path, text: str) -> Path:
 def test_without_sources_the_defaults_hold():
     loaded = load()
     assert loaded == Config()
-    assert (loaded.render.width, loaded.render.height, loaded.svgf.alpha, loaded.taa.alpha) == (640, 360, 0.2, 0.1)
+    assert (loaded.render.width, loaded.render.height, loaded.svgf.alpha, loaded.taa.alpha) == (640, 360, 0.07, 0.1)
 
 
 def test_file_beats_preset_and_override_beats_file(tmp_path, monkeypatch):
@@ -166,9 +166,9 @@ def test_configs_are_immutable_hashable_and_checked_when_replaced():
     loaded = load()
     with pytest.raises(dataclasses.FrozenInstanceError):
         loaded.svgf.alpha = 0.5  # type: ignore[misc]
-    changed = dataclasses.replace(loaded, svgf=dataclasses.replace(loaded.svgf, iterations=3))
+    changed = dataclasses.replace(loaded, svgf=dataclasses.replace(loaded.svgf, iterations=4))
     assert {loaded: 1, changed: 2}[Config()] == 1
-    assert changed.svgf.iterations == 3
+    assert changed.svgf.iterations == 4
     with pytest.raises(UserError, match=r"\[svgf\] iterations: must be in \[0;8\], not 9"):
         dataclasses.replace(loaded.svgf, iterations=9)
 
@@ -240,7 +240,7 @@ def test_describe_has_every_parameter_once():
         if section.name in SECTIONS
         for item in dataclasses.fields(getattr(Config(), section.name))
     ]
-    assert ("svgf", "iterations", "int", "5", "[0;8]") in [row[:5] for row in rows]
+    assert ("svgf", "iterations", "int", "3", "[0;8]") in [row[:5] for row in rows]
     assert ("taa", "clip", "bool", "true", "true | false") in [row[:5] for row in rows]
     assert ("render", "sequence", "str", '"halton"', '"halton" | "hash"') in [row[:5] for row in rows]
 

@@ -111,9 +111,9 @@ def test_stages_of_a_method_with_two_sections():
 def test_the_wavelet_and_its_iterations():
     s = press(state(), "F3")
     assert s.config.svgf.iterations == 0
-    assert press(s, "F3").config.svgf.iterations == 5
-    assert press(s, "LEFT", "LEFT").config.svgf.iterations == 3
-    assert press(s, "F3", "F3").config.svgf.iterations == 3, "as many as there were"
+    assert press(s, "F3").config.svgf.iterations == 3
+    assert press(s, "LEFT", "LEFT").config.svgf.iterations == 1
+    assert press(s, "F3", "F3").config.svgf.iterations == 1, "as many as there were"
     assert press(s, *["RIGHT"] * 9).config.svgf.iterations == 8, "not beyond the range"
     assert press(s, *["LEFT"] * 9).config.svgf.iterations == 0
     assert press(s, "F3").config.svgf.iterations > 0

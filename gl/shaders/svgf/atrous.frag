@@ -53,17 +53,17 @@ vec4 color_at(ivec2 q) {
     return c;
 }
 
+#ifndef GROWING
 float normal_weight(vec3 n) {
     float w = max(dot(surface.xyz, n), 0.0);
-#ifdef GROWING
-    w = pow(w, exponent);
-#elif SIGMA_N_SQUARINGS >= 0
+#if SIGMA_N_SQUARINGS >= 0
     for (int i = 0; i < SIGMA_N_SQUARINGS; ++i) w *= w;
 #else
     w = pow(w, u_sigma_n);
 #endif
     return w;
 }
+#endif
 
 void tap(ivec2 offset, float kernel, float inverse_z) {
     ivec2 q = p + offset;
@@ -79,7 +79,13 @@ void tap(ivec2 offset, float kernel, float inverse_z) {
     vec4 gloss = texelFetch(in_specular_albedo, q, 0);
     e += abs(roughness - gloss.a) * inverse_r + length(vec2(offset)) * inverse_reach;
 #endif
+#ifdef GROWING
+    // A power of the cosine, in the exponential that is there anyway. Of 0 there is no logarithm.
+    e -= exponent * log2(max(dot(surface.xyz, s.xyz), 1e-30));
+    float w = kernel * exp2(-e);
+#else
     float w = kernel * normal_weight(s.xyz) * exp2(-e);
+#endif
 #ifdef GLOSSY
     w = gloss.r + gloss.g + gloss.b > 0.0 ? w : 0.0; // where nothing shines there is no light to tell of
 #endif

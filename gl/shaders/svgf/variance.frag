@@ -1,6 +1,7 @@
 // Variance in space where the history is too short for one in time. Schied et al. 2017, sec. 4.2.
 //
-// GLOSSY: specular light, of surfaces of like roughness. PREFILTER: the colour there is replaced by its mean in space, too.
+// GLOSSY: specular light, of surfaces of like roughness. PREFILTER: the colour there is replaced by its mean in space,
+// too; that of specular light over no more pixels than its lobe is wide.
 // CENTRED: the second moment is that about the mean. SAMPLE: everywhere, of this frame's samples.
 
 #include "common/color.glsl"
@@ -21,6 +22,7 @@ uniform sampler2D in_surface;
 #ifdef GLOSSY
 uniform sampler2D in_specular_albedo; // a: roughness
 uniform float u_sigma_r;
+uniform float u_reach;
 #endif
 uniform sampler2D in_gradient;
 uniform float u_sigma_z;
@@ -81,12 +83,13 @@ void main() {
 #endif
     int last = wanted && surface.w > 0.0 ? 48 : -1;
     vec3 sum = vec3(0.0);
-    vec3 colors = vec3(0.0);
+    vec4 colors = vec4(0.0); // a: weight
     ivec2 size = textureSize(in_color, 0);
     vec2 gradient = texelFetch(in_gradient, p, 0).xy;
     float floor_z = 0.1 * u_pixel_size * surface.w;
 #ifdef GLOSSY
     float roughness = texelFetch(in_specular_albedo, p, 0).a;
+    float inverse_reach = 1.0 / (u_reach * roughness * roughness + 0.1);
 #endif
     for (int i = 0; i <= last; ++i) {
         ivec2 d = ivec2(i % 7, i / 7) - 3;
@@ -107,19 +110,22 @@ void main() {
         w = sample_at(q).a < 0.0 ? 0.0 : w;
 #endif
         sum += w * vec3(moments_at(q), 1.0);
-        colors += w * color_at(q).rgb;
+#ifdef GLOSSY
+        w *= exp(-length(vec2(d)) * inverse_reach); // a variance may be that of a wider field, a reflection may not
+#endif
+        colors += w * vec4(color_at(q).rgb, 1.0);
     }
-    if (last >= 0 && sum.z > 0.0) {
+    if (last >= 0 && sum.z > 0.0 && colors.a > 0.0) {
         vec2 m = sum.xy / sum.z;
         // Few frames make a poor estimate, and a low one freezes the noise: exaggerate while the history is short.
         float variance = max(m.y - m.x * m.x, 0.0) * MIN_HISTORY / h;
         color.a = min(sqrt(variance), HALF_LIMIT);
 #if defined(PREFILTER) && defined(SAMPLE)
-        if (texelFetch(in_reprojection, p, 0).w + 1.0 < MIN_HISTORY) color.rgb = colors / sum.z;
+        if (texelFetch(in_reprojection, p, 0).w + 1.0 < MIN_HISTORY) color.rgb = colors.rgb / colors.a;
 #elif defined(PREFILTER)
-        color.rgb = colors / sum.z;
+        color.rgb = colors.rgb / colors.a;
 #elif !HAS_IN_MOMENTS && !defined(SAMPLE)
-        if (color_at(p).a < 0.0) color.rgb = colors / sum.z; // without time there is nothing else to take
+        if (color_at(p).a < 0.0) color.rgb = colors.rgb / colors.a; // without time there is nothing else to take
 #endif
     }
     color.a = max(color.a, 0.0);
