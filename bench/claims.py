@@ -39,7 +39,10 @@ def claims(result: QualityResult) -> tuple[Claim, ...]:
 def _of(scene: str, one: Contender, by_name: dict[str, Contender]) -> Iterator[Claim]:
     fronts = [name for name, best in (("RMSE", one.best_rmse), ("FLIP", one.best_flip)) if best]
     yield Claim(scene, one.name, "on the Pareto front", ", ".join(fronts) or "neither", "RMSE or FLIP", bool(fronts))
-    others = {"accumulation alone": by_name.get("accumulation")}
+    others = {
+        "accumulation alone": by_name.get("accumulation"),
+        "accumulation with the papers' share": by_name.get("accumulation, the papers' share"),
+    }
     for error, factor in FACTORS.get(scene, {}).items():
         for name, other in others.items():
             if other is not None:

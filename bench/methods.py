@@ -88,6 +88,7 @@ BMFR_PAPER = Method("BMFR as published", "bmfr", preset="paper", group="BMFR")
 _LISTED = (
     NOISY,
     Method("accumulation", "accumulate", group="baseline"),
+    Method("accumulation, the papers' share", "accumulate", settings=("svgf.alpha=0.2",), group="baseline"),
     ONE_SIGNAL,
     ONE_SIGNAL_TAA,
     APART,

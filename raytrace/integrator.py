@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raytrace import kernels, kernels_glossy
+from raytrace.buffers import Buffers
 from raytrace.camera import Camera
 from raytrace.compiled import CompiledScene
 from raytrace.cutouts import CutoutCaster, cutouts_of
@@ -175,6 +176,7 @@ class Tracer:
             self._second_hit = kernels.second_hit_kernel(self.variant)
         self._scratch = _Scratch()
         self._memory = Memory()
+        self._buffers = Buffers()
         self.threads = self.settings.threads or len(os.sched_getaffinity(0))
         self._pool = ThreadPoolExecutor(self.threads, "trace") if self.threads > 1 else None
         self._time: tuple[float, float] | None = (0.0, 0.0) if not scene.moves else None
@@ -354,7 +356,7 @@ class Tracer:
         moment = Moment(index, now, size, (self.settings.seed, self.settings.generator))
         reshading = self._reshading(moment, previous, view, camera, cut, remember) if remember else None
         count = size[0] * size[1]
-        signals = np.empty((3 if self.variant.specular else 2, count, 4), np.float32)
+        signals = self._buffers.empty(3 if self.variant.specular else 2, count, 4)
         outputs = self._outputs(count)
 
         def tile(pixels: I32) -> None:
@@ -482,17 +484,17 @@ class Tracer:
 
     def _outputs(self, count: int) -> Outputs:
         none = np.zeros((1, 4), np.float32)
-        four = np.empty((4, count, 4), np.float32)
+        four = self._buffers.empty(4, count, 4)
         four[1, :, 3] = 1.0
 
         def optional(name: str) -> F32:
-            return np.empty((count, 4), np.float32) if name in self.images else none
+            return self._buffers.empty(count, 4) if name in self.images else none
 
         return Outputs(
             albedo=four[0],
             emission=four[1],
             surface=four[2],
-            gradient=np.empty((count, 2), np.float32),
+            gradient=self._buffers.empty(count, 2),
             motion=four[3],
             prev_normal=optional("prev_normal"),
             position=optional("position"),
